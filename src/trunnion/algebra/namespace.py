@@ -7,7 +7,7 @@ depends on the kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
 
-__all__ = ["Number", "Traced", "UntraceableError", "apart", "cut", "looped", "namespace"]
+__all__ = ["Number", "Traced", "UntraceableError", "apart", "cut", "looped", "namespace", "recurring"]
 
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
@@ -42,9 +42,20 @@ class Traced:
         """See the function `looped`; rounds: at least 1, and one of the start at least is of this kind."""
         raise NotImplementedError
 
+    @classmethod
+    def recurring(cls, function: Step, numbers: Sequence[Any], about: Callable[[], Hashable]) -> list[Any] | None:
+        """See the function `recurring`."""
+        raise NotImplementedError
+
     def cut(self) -> None:
         """See the function `cut`."""
         raise NotImplementedError
+
+
+def recurring(function: Step, numbers: Sequence[Number], about: Callable[[], Hashable]) -> list[Number] | None:
+    """function(numbers), recorded once for all that are alike in what they are about; None if that saves nothing."""
+    kind = next((type(number) for number in numbers if isinstance(number, Traced)), None)
+    return None if kind is None else kind.recurring(function, numbers, about)
 
 
 def cut(number: Number) -> None:

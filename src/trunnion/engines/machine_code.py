@@ -133,22 +133,6 @@ class MachineCode:
         call.held = alive  # type: ignore[attr-defined]
         return call
 
-    def rows_of(self, given: Array, count: int) -> Array:
-        """The outputs, (output, position), of a program whose inputs all differ by both, (input, position).
-
-        A row is as long as a vector at least. For few positions: `run` takes longer than its code there.
-        """
-        made = np.empty((count, given.shape[1]))
-        tables = [_pointers_to_rows(table) for table in (given, made)]
-        (inputs, outputs), none = [table.__array_interface__["data"][0] for table in tables], None
-        self.function(0, 1, 0, given.shape[1], given.shape[1], none, none, none, inputs, outputs, none)
-        return made
-
-
-def _pointers_to_rows(table: Array) -> NDArray[np.uintp]:
-    first: int = table.__array_interface__["data"][0]  # `ctypes.data` takes three times as long
-    return np.arange(first, first + table.nbytes, table.strides[0], dtype=np.uintp)
-
 
 def _pointers(arrays: Sequence[NDArray[Any]]) -> Any:
     return (ctypes.c_void_p * max(1, len(arrays)))(*(array.ctypes.data for array in arrays))

@@ -115,7 +115,13 @@ def _parts(graph: Graph, outputs: Sequence[int]) -> Iterator[_Part]:
         of_part.setdefault(part, []).append(number)
         needed.update(arg for arg in graph.nodes[number].args if bisect_right(graph.cuts, arg) < part)
     for part in sorted(of_part):
-        yield _copied(graph, of_part[part], needed)
+        call = next((number for number in of_part[part] if graph.nodes[number].op == "call"), None)
+        if call is None:
+            yield _copied(graph, of_part[part], needed)
+            continue
+        inner, results = graph.nodes[call].extra
+        outputs = [number for number in of_part[part] if number != call and number in needed]
+        yield _Part(inner, list(graph.nodes[call].args), outputs, [results[graph.nodes[n].extra] for n in outputs])
 
 
 def _with_loops(graph: Graph, outputs: Sequence[int]) -> list[int]:

@@ -126,8 +126,7 @@ class Backward:
     @functools.cached_property
     def bound(self) -> Number:
         """Largest bound of the equations of a module, 0 where no friction changes what presses on a contact."""
-        problems = [settled.problem for settled in self.settled if settled.problem and not settled.problem.one_way]
-        return functools.reduce(np.maximum, [problem.bound() for problem in problems], 0.0)
+        return functools.reduce(np.maximum, [settled.bound for settled in self.settled], 0.0)
 
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""

@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from trunnion.algebra import linalg
 from trunnion.algebra.literal import plus
-from trunnion.algebra.namespace import Number, apart, looped
+from trunnion.algebra.namespace import Number, apart, looped, recurring
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
@@ -41,7 +42,7 @@ class Settled(NamedTuple):
     module locks; contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
     changes (successive approximation). residual: largest difference between a friction and what its law says for the
     load that is found, N; where converged below OBEYED of the largest friction, unless a criterion is given. certain:
-    whether it is proved that there is no other solution; problem: the equations themselves.
+    whether it is proved that there is no other solution; bound: that of the equations, which are the problem.
     """
 
     reactions: Sequence[Reaction]
@@ -53,6 +54,7 @@ class Settled(NamedTuple):
     residual: Number = 0.0
     share: Number = 1.0
     certain: Number = True
+    bound: Number = 0.0
     problem: FrictionProblem | None = None
 
 
@@ -75,7 +77,28 @@ def settle(
     if problem.one_way and method.name == "newton":  # no law looks at what friction changes
         forces = problem.target(problem.state([0.0] * len(contacts)).normals)
         return Settled(problem.reactions(forces), forces, 1, 0.0, 0.0, True, problem=problem.real)
-    return _iterated(problem, method)
+    return _recurring(problem, method) or _iterated(problem, method)
+
+
+def _recurring(problem: FrictionProblem, method: FrictionMethod) -> Settled | None:
+    """`_iterated` of numbers that are recorded, once for all equations of a form; None of others."""
+    sizes = [len(reaction) for reaction in problem.start]
+
+    def figures(numbers: list[Number]) -> list[Number]:
+        each = iter(numbers)
+        settled = _iterated(problem.mapped(lambda _: next(each)), method)
+        return [*settled.forces, *settled[2:-1], *(part for reaction in settled.reactions for part in reaction)]
+
+    def about() -> Hashable:
+        forms = (Contact(c.joint, (), c.load.mapped(lambda _: 0.0), 0.0, c.rubs) for c in problem.contacts)
+        return method, *sizes, *forms
+
+    figures_made = recurring(figures, problem.numbers, about)
+    if figures_made is None:
+        return None
+    row = iter(figures_made)
+    forces, others = list(islice(row, len(problem.contacts))), list(islice(row, len(Settled._fields) - 3))
+    return Settled._make([[tuple(islice(row, size)) for size in sizes], forces, *others, problem])
 
 
 def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
@@ -98,7 +121,8 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     none: list[Number] = [0.0] * len(real.contacts)
     state = real.state(none)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    certain = ~(np.where(np.isfinite(largest(state.normals)), real.bound(), 0.0) >= 1.0)
+    bound = real.bound()
+    certain = ~(np.where(np.isfinite(largest(state.normals)), bound, 0.0) >= 1.0)
     at = _Iterate(none, state.normals, real.gaps(state, none))
     if newton:  # a lane without the certificate goes nowhere by itself
         at = at._replace(done=np.where(certain, 0.0, 1.0))
@@ -129,6 +153,7 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         residual=real.misfit(at.gaps),
         share=shares,
         certain=certain,
+        bound=bound,
         problem=real,
     )
 

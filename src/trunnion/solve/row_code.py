@@ -110,7 +110,7 @@ class RowCode:
 
     def __init__(self, system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve) -> None:
         self.assembly, self.turned, self.solve = assembly, turned, solve
-        graph, literal = Graph(), literals(values)
+        graph, literal = Graph(in_parts=True), literals(values)
         numbers = {path: Recorded(graph, graph.input(path, BOTH)) for path in values if path not in literal}
         time, conditions = Recorded(graph, graph.input(TIME, BOTH)), list[Number]()
         with np.errstate(all="ignore"):

@@ -38,28 +38,19 @@ def packed(header: Mapping[str, Any]) -> bytes:
 
     def column(numbers: np.ndarray) -> dict[str, Any]:
         nonlocal count
-        columns.append(numbers)
+        columns.append(np.ravel(numbers))
         count += numbers.size
         return {"column": [count - numbers.size, int(numbers.size)]}
 
-    def grid(value: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Many entries of columns that are alike; None of others."""
-        rows = list(value.values())
-        if len(rows) < SHORTEST or not all(isinstance(row, dict) and row.keys() == rows[0].keys() for row in rows):
-            return None
-        numbers = [number for row in rows for number in row.values()]
-        if not (numbers and all(type(number) is np.ndarray and number.shape == numbers[0].shape for number in numbers)):
-            return None
-        first, size = column(np.array(numbers).ravel())["column"]
-        return {"grid": [first, size // len(numbers)], "names": list(rows[0]), "keys": list(map(str, value))}
-
     def plain(value: Any) -> Any:
         if isinstance(value, Mapping):
-            if (alike := grid(value)) is not None:
-                return alike
+            rows = list(value.values())
+            if (alike := _columns_of(rows)) is not None:
+                first, size = column(np.array(alike))["column"]
+                return {"grid": [first, size // len(alike)], "names": list(rows[0]), "keys": list(map(str, value))}
             return {str(key): plain(item) for key, item in value.items()}
         if isinstance(value, np.ndarray):
-            return column(np.ravel(value))
+            return column(value)
         if isinstance(value, Exact):
             high = value.numbers.astype("<f4").astype(float)
             first, size = column(np.concatenate([high, value.numbers - high]))["column"]
@@ -85,3 +76,12 @@ def packed(header: Mapping[str, Any]) -> bytes:
     text = json.dumps(head, allow_nan=False).encode()  # ASCII: half a character of the page's text comes back as it was
     text += b" " * (-len(text) % 4)
     return struct.pack("<I", len(text)) + text + body + b"".join(files)
+
+
+def _columns_of(rows: list[Any]) -> list[np.ndarray] | None:
+    """The columns of many entries that are alike; None of others."""
+    if len(rows) < SHORTEST or not all(isinstance(row, dict) and row.keys() == rows[0].keys() for row in rows):
+        return None
+    columns = [column for row in rows for column in row.values()]
+    alike = all(type(column) is np.ndarray and column.shape == columns[0].shape for column in columns)
+    return columns if columns and alike else None

@@ -32,7 +32,7 @@ __all__ = ["Live", "live_columns", "live_in_space", "places_at", "uncollected"]
 Array = NDArray[np.float64]
 
 AT_ONCE = 12_000  # joints times positions whose forces are worked out in the time of a picture
-MOST_TRACKED = 20_000  # places of all tracks that are drawn in it
+MOST_TRACKED = 6_000  # places of all tracks that are drawn in it: the page writes each as text
 STILL = 1e-9  # of the size: a point that moves less has no track
 MOST_FOLLOWED = 16  # contacts whose friction is followed until they lock: the time grows with their cube
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces

@@ -10,7 +10,7 @@ from trunnion.algebra.dual import Dual
 from trunnion.engines import parts
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve import backward
+from trunnion.solve import backward, row_code
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.margin import margin_in
 from trunnion.solve.row_code import leaves_of
@@ -91,3 +91,28 @@ def test_derivatives_are_those_of_numpy(monkeypatch):
         slopes.append(np.array([np.broadcast_to(part.dual, STEPS) for part in parts]))
     assert np.nanmax(np.abs(slopes[0])) > 0
     np.testing.assert_allclose(slopes[1], slopes[0], rtol=0, atol=1e-10 * np.nanmax(np.abs(slopes[0])))
+
+
+def test_one_code_serves_mechanisms_that_differ_by_numbers(monkeypatch):
+    monkeypatch.setattr(row_code, "_recorded", {})
+    for length in ("100 mm", "101 mm"):
+        run = prepare(Mechanism(**entries_of(chain(13).replace("c: 100 mm", f"c: {length}"))[0]))
+        time = run.cycle.times(STEPS)
+        with np.errstate(all="ignore"):
+            coded = run.solve(time)
+            monkeypatch.setattr(backward, "MANY_MODULES", 10**9)
+            _same(run.solve(time), coded, time)
+        monkeypatch.setattr(backward, "MANY_MODULES", 12)
+    assert len(row_code._recorded) == 1
+
+
+def test_numpy_solves_until_the_code_is_wanted(monkeypatch):
+    run = prepare(Mechanism(**entries_of(chain(14))[0]))
+    ran, run_code = [], parts.Parts.run
+    monkeypatch.setattr(parts.Parts, "run", lambda *given: ran.append(given) or run_code(*given))
+    run.compile(now=False)
+    run.solve(run.cycle.times(3))
+    assert not ran
+    run.compile()
+    run.solve(run.cycle.times(3))
+    assert ran

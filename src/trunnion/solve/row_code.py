@@ -32,6 +32,7 @@ __all__ = ["RowCode", "code_of", "leaves_of"]
 Array = NDArray[np.float64]
 Solve = Callable[[System, Values, Assembly, Number, bool], Any]  # gives a `Backward`
 
+MOST_CODES = 8  # of a system: numbers that are 0 or 1 are compiled in, and to record each choice of them takes seconds
 MOST_FORMS = 16  # of mechanisms whose code is kept at hand
 TRIED = np.array([0.0, 0.0137, 0.137, 1.37])  # s, at which code that was recorded of another mechanism is tried
 NUMBER = re.compile(r"[-+]?\.?\d[\d.]*([eE][-+]?\d+)?( [^-+*/^()]*)?$")  # with its unit, but no expression
@@ -64,6 +65,8 @@ def code_of(
         return None
     literal = tuple((path, value) for path, value in values.items() if value in STRUCTURAL)
     key = literal, tuple(placed if isinstance(placed, int) else id(placed) for placed in assembly), turned
+    if key not in system.codes and len(system.codes) >= MOST_CODES:
+        return None
     if held:
         system.codes.setdefault(key, None)
     elif key not in system.codes or (held is False and system.codes[key] is None):

@@ -72,7 +72,7 @@ KERNELS = [
     for folder in ("algebra", "joints", "groups", "solve")
     for path in sorted((SOURCE / folder).rglob("*.py"))
 ]
-ENTRANCES = {Path("solve/walk_kernel.py"), Path("solve/settle_code.py")}  # where a walk, or friction, goes to an engine
+ENTRANCES = {Path("solve/walk_kernel.py"), Path("solve/row_code.py")}  # where a walk goes to an engine
 VOCABULARY = Path("algebra/namespace.py")
 RECORDED = {"Traced", "Recorded", "UntraceableError"}
 

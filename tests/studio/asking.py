@@ -91,6 +91,10 @@ def unpacked(answer: bytes) -> dict[str, Any]:
             columns = np.frombuffer(body, "<f4", parts * count, 4 * first).reshape(parts, count)
             numbers = columns.astype(float).sum(axis=0)
             return [float(one) if np.isfinite(one) else None for one in numbers]
+        if "grid" in value:
+            (first, count), names = value["grid"], value["names"]
+            starts = iter(range(first, first + count * len(names) * len(value["keys"]), count))
+            return {key: {name: whole({"column": [next(starts), count]}) for name in names} for key in value["keys"]}
         return {key: whole(one) for key, one in value.items()}
 
     found: dict[str, Any] = whole(header)

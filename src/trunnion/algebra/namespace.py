@@ -7,7 +7,7 @@ depends on the kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
 
-__all__ = ["Number", "Traced", "UntraceableError", "apart", "looped", "namespace"]
+__all__ = ["Number", "Traced", "UntraceableError", "apart", "cut", "looped", "namespace", "recurring"]
 
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
@@ -41,6 +41,27 @@ class Traced:
     def looped(cls, step: Step, start: Sequence[Any], rounds: int, done: Done | None) -> list[Any]:
         """See the function `looped`; rounds: at least 1, and one of the start at least is of this kind."""
         raise NotImplementedError
+
+    @classmethod
+    def recurring(cls, function: Step, numbers: Sequence[Any], about: Callable[[], Hashable]) -> list[Any] | None:
+        """See the function `recurring`."""
+        raise NotImplementedError
+
+    def cut(self) -> None:
+        """See the function `cut`."""
+        raise NotImplementedError
+
+
+def recurring(function: Step, numbers: Sequence[Number], about: Callable[[], Hashable]) -> list[Number] | None:
+    """function(numbers), recorded once for all that are alike in what they are about; None if that saves nothing."""
+    kind = next((type(number) for number in numbers if isinstance(number, Traced)), None)
+    return None if kind is None else kind.recurring(function, numbers, about)
+
+
+def cut(number: Number) -> None:
+    """A part of a long computation ends: what is recorded from here on may be compiled by itself."""
+    if isinstance(number, Traced):
+        number.cut()
 
 
 def namespace(*numbers: Number) -> Any:

@@ -151,11 +151,7 @@ def _back(run: Run, walk: Forward, method: FrictionMethod) -> Backward:
 
 def locks(back: Backward) -> NDArray[np.bool_]:
     """Where a module locks."""
-    shape = np.shape(back.walk.time)
-    locked = np.zeros(shape, bool)
-    for settled in back.settled:
-        locked |= np.broadcast_to(np.asarray(settled.share) < 1.0, shape)
-    return locked
+    return np.broadcast_to(np.less(back.share, 1.0), np.shape(back.walk.time))
 
 
 # ---- multiples of the friction --------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from trunnion.dynamics.solution import Ended, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.errors import Status
 from trunnion.solve.change_points import touched
-from trunnion.solve.status import NEAR_SINGULAR, pose_status, worst_condition
+from trunnion.solve.status import NEAR_SINGULAR, pose_status
 
 __all__ = ["Crossing", "DeadCentre", "Guards", "first_crossing"]
 
@@ -230,7 +230,7 @@ class DeadCentre:
         with np.errstate(all="ignore"):
             walk = self.motion.walk(at, np.zeros_like(at.q))
             nearest = NEAR_SINGULAR if self.motion.affine else RUBBING
-            near = np.broadcast_to(worst_condition(walk), (3,))[0] > nearest
+            near = np.broadcast_to(walk.condition, (3,))[0] > nearest
             status = pose_status(walk, (3,))
         if not near or status[1] == Status.NOT_ASSEMBLED or status[2] != Status.NOT_ASSEMBLED:
             return None

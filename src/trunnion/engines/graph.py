@@ -65,17 +65,23 @@ class Graph:
     """Nodes in the order of their making.
 
     inputs: name and what it differs by, in order. doubts: conditions under which an operation is not as exact as
-    elsewhere, so that NumPy has to decide.
+    elsewhere, so that NumPy has to decide. in_parts: whether it is compiled part by part, between its cuts.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, in_parts: bool = False) -> None:
+        self.in_parts = in_parts
         self.nodes: list[Node] = []
         self.differs: list[int] = []  # of each node, by SAMPLE and POSITION
         self.within: list[int] = []  # of each node the loops whose state it depends on, a bit each
         self.loops: list[Loop] = []
         self.inputs: dict[str, int] = {}
         self.doubts: list[int] = []
+        self.cuts: list[int] = []  # nodes that begin a part which may be compiled by itself
         self._numbers: dict[Any, int] = {}
+
+    def cut(self) -> None:
+        """End a part here."""
+        self.cuts.append(len(self.nodes))
 
     # ---- making nodes -----------------------------------------------------------------------------------------
 

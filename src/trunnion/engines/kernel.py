@@ -24,7 +24,7 @@ from trunnion.engines.recorded import Recorded, number_of
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = ["Array", "Kernel", "Lanes", "lanes_of", "literals", "time_of"]
+__all__ = ["STRUCTURAL", "TIME", "Array", "Kernel", "Lanes", "lanes_of", "literals", "time_of"]
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Any]

@@ -89,7 +89,7 @@ class MachineCode:
         with COMPILING:
             self._engine = _linked(code)
         kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
-        self._function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
+        self.function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
 
     def run(
         self,
@@ -128,26 +128,10 @@ class MachineCode:
         alive = inputs, outputs, table  # as long as their addresses are in use
 
         def call() -> None:
-            self._function(*arguments)
+            self.function(*arguments)
 
         call.held = alive  # type: ignore[attr-defined]
         return call
-
-    def rows_of(self, given: Array, count: int) -> Array:
-        """The outputs, (output, position), of a program whose inputs all differ by both, (input, position).
-
-        A row is as long as a vector at least. For few positions: `run` takes longer than its code there.
-        """
-        made = np.empty((count, given.shape[1]))
-        tables = [_pointers_to_rows(table) for table in (given, made)]
-        (inputs, outputs), none = [table.__array_interface__["data"][0] for table in tables], None
-        self._function(0, 1, 0, given.shape[1], given.shape[1], none, none, none, inputs, outputs, none)
-        return made
-
-
-def _pointers_to_rows(table: Array) -> NDArray[np.uintp]:
-    first: int = table.__array_interface__["data"][0]  # `ctypes.data` takes three times as long
-    return np.arange(first, first + table.nbytes, table.strides[0], dtype=np.uintp)
 
 
 def _pointers(arrays: Sequence[NDArray[Any]]) -> Any:

@@ -7,16 +7,19 @@ they are; who compiles must find them and compute them again with NumPy.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from itertools import count
 from typing import Any
 
 import numpy as np
 
 from trunnion.algebra.namespace import Done, Step, Traced, UntraceableError
-from trunnion.engines.graph import Graph
+from trunnion.engines.graph import BOTH, Graph
 
 __all__ = ["Recorded", "number_of"]
 
+MOST_RECURRING = 64  # functions of numbers whose records are kept at hand
+_recurring: dict[Hashable, tuple[Graph, list[int]]] = {}
 OF_ALL_LANES: dict[Any, bool] = {np.any: True, np.all: False}  # the answers that no lane contradicts
 
 
@@ -87,6 +90,34 @@ class Recorded(Traced):
 
         first = [number_of(graph, number) for number in start]
         return recorded(graph.loop(further, first, rounds, stays if done is not None else None))
+
+    def cut(self) -> None:
+        self.graph.cut()
+
+    @classmethod
+    def recurring(cls, function: Step, numbers: Sequence[Any], about: Callable[[], Hashable]) -> list[Any] | None:
+        graph = _graph_of(numbers)
+        if not graph.in_parts:
+            return None
+        nodes = [graph.as_float(number_of(graph, number)) for number in numbers]
+        constants = tuple(graph.value(node) for node in nodes)
+        key = about(), constants
+        if key not in _recurring:
+            if len(_recurring) >= MOST_RECURRING:
+                _recurring.clear()
+            inner, places = Graph(), count()
+            given = [Recorded(inner, inner.input(str(next(places)), BOTH)) if n is None else n for n in constants]
+            made = function(list(given))
+            _recurring[key] = inner, [number_of(inner, number) for number in made]
+        inner, results = _recurring[key]
+        graph.cut()
+        varying = tuple(node for node, constant in zip(nodes, constants, strict=True) if constant is None)
+        call = graph.node("call", varying, (inner, tuple(inner.as_float(result) for result in results)))
+        fixed = [inner.value(result) for result in results]
+        rows = [Recorded(graph, graph.node("result", (call,), k)) if n is None else n for k, n in enumerate(fixed)]
+        graph.cut()
+        return [row != 0.0 if inner.boolean(result) and n is None else row
+                for row, result, n in zip(rows, results, fixed, strict=True)]  # fmt: skip
 
     def all(self, axis: Any = None) -> Any:
         return np.all(self, axis=axis)

@@ -7,13 +7,13 @@ import operator
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.namespace import Number, cut, namespace
 from trunnion.algebra.nested import flat
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.friction import directed
@@ -26,11 +26,14 @@ from trunnion.solve.gears import GearLoad, acting, gear_load, on_thread, power_o
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, law_parameters, rubbing
 
+if TYPE_CHECKING:
+    from trunnion.solve.row_code import RowCode
+
 __all__ = [
-    "Backward", "Given", "Sense", "backward", "pass_on", "sense_of", "solve", "unloaded",
+    "Backward", "Given", "Sense", "backward", "by_numpy", "pass_on", "row_code", "sense_of", "solve", "unloaded",
 ]  # fmt: skip
 
-MANY_MODULES = 12  # of a row whose friction is settled by machine code: of fewer, loading LLVM takes longer
+MANY_MODULES = 12  # of a row that is solved by machine code: of fewer, loading LLVM takes longer
 
 
 Sense = Share | tuple[Share, ...]
@@ -110,6 +113,21 @@ class Backward:
     margin_up_to: float = 0.0
     margin: Number | None = None
 
+    @functools.cached_property
+    def converged(self) -> Number:
+        """Where the friction of every module is settled."""
+        return functools.reduce(np.logical_and, [settled.converged for settled in self.settled], np.True_)
+
+    @functools.cached_property
+    def share(self) -> Number:
+        """Least share of its friction that a module reaches: 1 unless the position is locked."""
+        return functools.reduce(np.minimum, [settled.share for settled in self.settled], 1.0)
+
+    @functools.cached_property
+    def bound(self) -> Number:
+        """Largest bound of the equations of a module, 0 where no friction changes what presses on a contact."""
+        return functools.reduce(np.maximum, [settled.bound for settled in self.settled], 0.0)
+
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
         return self.walk.in_hole(joint, self.reactions[joint])
@@ -140,18 +158,75 @@ def solve(
     values: every number by path; floats, arrays (sample, 1) or dual numbers. time: (position,).
     conditions: what is known of the joints beside the motion.
     """
-    conditions = conditions or Given()
-    walk = forward(system, values, assembly, time, conditions.travel)
+    method, conditions = method or FrictionMethod(), conditions or Given()
+    coded = _by_code(system, values, assembly, time, method, conditions)
+    if coded is not None:
+        return coded
     with np.errstate(all="ignore"):
-        return backward(walk, method or FrictionMethod(), conditions)
+        return by_numpy(forward(system, values, assembly, time, conditions.travel), method, conditions)
 
 
 def backward(walk: Forward, method: FrictionMethod, conditions: Given) -> Backward:
+    """Reactions and friction of every module of a walk, in its direction."""
+    if walk.direction < 0 and walk.assembly:
+        coded = _by_code(walk.system, walk.values, walk.assembly, walk.time, method, conditions, turned=True)
+        if coded is not None:
+            return coded
+    return by_numpy(walk, method, conditions)
+
+
+def _by_code(
+    system: System,
+    values: Values,
+    assembly: Assembly,
+    time: Number,
+    method: FrictionMethod,
+    conditions: Given,
+    turned: bool = False,
+) -> Backward | None:
+    """The same by machine code, of a long row; None where that is for NumPy. turned: passed the other way."""
+    usual = method.name == "newton" and method.limit == FrictionMethod.limit
+    if (
+        np.ndim(time) != 1
+        or any(vars(conditions).values())
+        or not (usual and method.criterion is None and method.multiple is None)
+    ):
+        return None
+    code = row_code(system, values, assembly, turned)
+    back: Backward | None = None if code is None else code.solved(system, values, np.asarray(time, float))
+    if back is not None:
+        back.margin_up_to = method.margin_up_to
+    return back
+
+
+def row_code(
+    system: System, values: Values, assembly: Assembly, turned: bool = False, held: bool | None = None
+) -> RowCode | None:
+    """Machine code that solves a long row, see `row_code.code_of`; None of few modules."""
+    if len(system.plan.modules) < MANY_MODULES:
+        return None
+    from trunnion.solve.row_code import code_of  # LLVM is loaded for long rows alone
+
+    return code_of(system, values, assembly, turned, _recorded, held)
+
+
+def _recorded(system: System, values: Values, assembly: Assembly, time: Number, turned: bool) -> Backward:
+    """What machine code does, and NumPy at positions which that does not decide."""
+    with np.errstate(all="ignore"):
+        walk = forward(system, values, assembly, time)
+        return by_numpy(walk.backward() if turned else walk, FrictionMethod(), Given())
+
+
+def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
     back = Backward(walk, unloaded(walk), travels=bool(conditions.travel), margin_up_to=method.margin_up_to)
-    back.contacts = {joint: list(contacts_of(walk, joint)) for joint in rubbing(system)}
-    back.resting = {joint: _resting(back, joint) for joint in system.joints}
+    rubs = frozenset(rubbing(system))
+    for joint in system.joints:
+        if joint in rubs:
+            back.contacts[joint] = list(contacts_of(walk, joint))
+        back.resting[joint] = _resting(back, joint)
+        cut(walk.time)
     _add_body_loads(back)
     _add_stated_loads(back, conditions.zero_slip, conditions.rests)
     for name, action in conditions.acting(walk) if conditions.acting else ():
@@ -160,6 +235,7 @@ def backward(walk: Forward, method: FrictionMethod, conditions: Given) -> Backwa
     back.stated = dict(back.loads)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, conditions)
+        cut(walk.time)
     return back
 
 
@@ -192,6 +268,7 @@ def _add_body_loads(back: Backward) -> None:
         load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
         back.body_power = back.body_power + algebra.power(load, twist)
         back.add(link, load)
+        cut(walk.time)
 
 
 def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], sensed: Container[str]) -> None:
@@ -231,8 +308,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, conditio
             unit_loads = units(walk, number, on_thread(walk, number, i, 1.0))
             rubbed.append((Contact(len(places) + i, unit_loads, rub.load, slope), felt))
     rubbed += [(contact, None) for contact in teeth(walk, number)]
-    coded = len(system.plan.modules) >= MANY_MODULES
-    settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method, coded)
+    settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
     back.rubbed.append(rubbed)
     if module.spinning:

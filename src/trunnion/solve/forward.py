@@ -6,6 +6,7 @@ plane has its wrench about its point on its second link, where a pin carries no 
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +18,7 @@ import numpy as np
 from trunnion.algebra import plane, space
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.literal import is_zero
-from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.namespace import Number, cut, namespace
 from trunnion.algebra.nested import each, flat, zipped
 from trunnion.algebra.plane import Twist, Wrench
 from trunnion.algebra.space import Screw
@@ -99,6 +100,20 @@ class Forward:
     def spins(self) -> dict[str, Number]:
         """Angular speed of every link, rad/s; real parts."""
         return {link: self.algebra.spin(motion.twist) for link, motion in self.motions.items()}
+
+    # ---- what it is worth ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def condition(self) -> Number:
+        """Largest condition of a module."""
+        parts = (primal(group.condition(pose)) for group, pose in zip(self.system.groups, self.poses, strict=True))
+        return functools.reduce(np.maximum, parts, 1.0)
+
+    @cached_property
+    def assembled(self) -> Number:
+        """Where every module can be assembled."""
+        sums = (sum(map(primal, flat(frame)), 0.0) for pose in self.poses for frame in pose.frames)
+        return functools.reduce(operator.and_, map(np.isfinite, sums), np.True_)
 
     # ---- joints -----------------------------------------------------------------------------------------------
 
@@ -535,6 +550,7 @@ def forward(
     seats of pins travel.
     """
     walk = _walked(system, values, assembly, time, lambda walk, number, pose: walk.take(number, pose, time))
+    walk.assembly = [] if travel else list(assembly)
     for link, added in (travel or {}).items():
         motion = walk.motions[link]
         walk.motions[link] = Motion(
@@ -559,6 +575,7 @@ def _walked(
     with np.errstate(all="ignore"):
         for number, placed in enumerate(assembly):
             add(walk, number, pose_of(walk, number, placed, time))
+            cut(time)
     return walk
 
 

@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from trunnion.algebra import linalg
 from trunnion.algebra.literal import plus
-from trunnion.algebra.namespace import Number, apart, looped
+from trunnion.algebra.namespace import Number, apart, looped, recurring
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
@@ -41,7 +42,7 @@ class Settled(NamedTuple):
     module locks; contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
     changes (successive approximation). residual: largest difference between a friction and what its law says for the
     load that is found, N; where converged below OBEYED of the largest friction, unless a criterion is given. certain:
-    whether it is proved that there is no other solution; problem: the equations themselves.
+    whether it is proved that there is no other solution; bound: that of the equations, which are the problem.
     """
 
     reactions: Sequence[Reaction]
@@ -53,6 +54,7 @@ class Settled(NamedTuple):
     residual: Number = 0.0
     share: Number = 1.0
     certain: Number = True
+    bound: Number = 0.0
     problem: FrictionProblem | None = None
 
 
@@ -61,12 +63,8 @@ def settle(
     loads: Sequence[Any],
     contacts: Sequence[Contact],
     method: FrictionMethod,
-    coded: bool = False,
 ) -> Settled:
-    """Reactions and friction forces of one module, whose reactions to loads are linear, under `loads`.
-
-    coded: whether its rounds are worth machine code, see `settle_code`.
-    """
+    """Reactions and friction forces of one module, whose reactions to loads are linear, under `loads`."""
     start = reactions(loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
@@ -79,7 +77,28 @@ def settle(
     if problem.one_way and method.name == "newton":  # no law looks at what friction changes
         forces = problem.target(problem.state([0.0] * len(contacts)).normals)
         return Settled(problem.reactions(forces), forces, 1, 0.0, 0.0, True, problem=problem.real)
-    return _iterated(problem, method, coded)
+    return _recurring(problem, method) or _iterated(problem, method)
+
+
+def _recurring(problem: FrictionProblem, method: FrictionMethod) -> Settled | None:
+    """`_iterated` of numbers that are recorded, once for all equations of a form; None of others."""
+    sizes = [len(reaction) for reaction in problem.start]
+
+    def figures(numbers: list[Number]) -> list[Number]:
+        each = iter(numbers)
+        settled = _iterated(problem.mapped(lambda _: next(each)), method)
+        return [*settled.forces, *settled[2:-1], *(part for reaction in settled.reactions for part in reaction)]
+
+    def about() -> Hashable:
+        forms = (Contact(c.joint, (), c.load.mapped(lambda _: 0.0), 0.0, c.rubs) for c in problem.contacts)
+        return method, *sizes, *forms
+
+    figures_made = recurring(figures, problem.numbers, about)
+    if figures_made is None:
+        return None
+    row = iter(figures_made)
+    forces, others = list(islice(row, len(problem.contacts))), list(islice(row, len(Settled._fields) - 3))
+    return Settled._make([[tuple(islice(row, size)) for size in sizes], forces, *others, problem])
 
 
 def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
@@ -89,7 +108,7 @@ def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     return column
 
 
-def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> Settled:
+def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     """From no friction by rounds of the method; Newton's follows lanes without the certificate of `bound` afterwards.
 
     So it does certain lanes that kinks keep from settling: their continuation leads to the same, only solution. A
@@ -99,8 +118,15 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> 
     real, newton = problem.real, method.name == "newton"
     shares: Number = 1.0
     rounds = min(method.limit, STUBBORN) if newton else method.limit
-    begun = _begun_by_code(real, rounds, method) if coded and newton else None
-    certain, at, reactions = begun or (*_begun(real, rounds, method), None)
+    none: list[Number] = [0.0] * len(real.contacts)
+    state = real.state(none)
+    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
+    bound = real.bound()
+    certain = ~(np.where(np.isfinite(largest(state.normals)), bound, 0.0) >= 1.0)
+    at = _Iterate(none, state.normals, real.gaps(state, none))
+    if newton:  # a lane without the certificate goes nowhere by itself
+        at = at._replace(done=np.where(certain, 0.0, 1.0))
+    at = _rounds(real, at, rounds, method)
     if newton:
         left = ~certain
         if method.limit >= STUBBORN:
@@ -110,15 +136,15 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> 
             state = real.state(forces)
             at = at._replace(forces=forces, normals=state.normals, gaps=real.gaps(state, forces))
             at = at._replace(done=np.where(left, 0.0, 1.0))
-            at, reactions = _rounds(real, at, rounds, method), None
+            at = _rounds(real, at, rounds, method)
     converged = (at.done > 0) if method.criterion is not None else _obeyed(real, at)
     forces = at.forces
     if problem.depth:  # Newton's method at the solution gives the derivatives, one level of ε a round
-        slopes, reactions = real.map_derivative(real.state(forces, at.normals)), None
+        slopes = real.map_derivative(real.state(forces, at.normals))
         for _ in range(problem.depth):
             forces = _corrected(forces, problem.gaps(problem.state(forces), forces), slopes)
     return Settled(
-        reactions=problem.reactions(forces) if reactions is None else reactions,
+        reactions=problem.reactions(forces),
         forces=forces,
         iterations=at.rounds,
         change=at.change,
@@ -127,40 +153,9 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> 
         residual=real.misfit(at.gaps),
         share=shares,
         certain=certain,
+        bound=bound,
         problem=real,
     )
-
-
-def _begun(real: FrictionProblem, rounds: int, method: FrictionMethod) -> tuple[Number, _Iterate]:
-    """Whether lanes have the certificate, and where so many rounds lead from no friction."""
-    none: list[Number] = [0.0] * len(real.contacts)
-    state = real.state(none)
-    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    certain = ~(np.where(np.isfinite(largest(state.normals)), real.bound(), 0.0) >= 1.0)
-    at = _Iterate(none, state.normals, real.gaps(state, none))
-    if method.name == "newton":  # a lane without the certificate goes nowhere by itself
-        at = at._replace(done=np.where(certain, 0.0, 1.0))
-    return certain, _rounds(real, at, rounds, method)
-
-
-def _begun_by_code(
-    real: FrictionProblem, rounds: int, method: FrictionMethod
-) -> tuple[Number, _Iterate, list[Reaction]] | None:
-    """The same with the reactions there, by machine code; None where the equations have none."""
-    from trunnion.solve.settle_code import settled_by_code  # LLVM is loaded for rows of many modules alone
-
-    def row(problem: FrictionProblem) -> list[Number]:
-        certain, at = _begun(problem, rounds, method)
-        return [certain, *at.in_row(), *(part for reaction in problem.reactions(at.forces) for part in reaction)]
-
-    found = settled_by_code(real, row, (rounds, method.criterion))
-    if found is None:
-        return None
-    at = _Iterate([0.0] * len(real.contacts), [], [])
-    size = 3 * len(at.forces) + len(at) - 3
-    parts = iter(found[1 + size :])
-    reactions = [tuple([next(parts) for _ in reaction]) for reaction in real.start]
-    return found[0] != 0.0, at.of_row(found[1 : 1 + size]), reactions
 
 
 class _Iterate(NamedTuple):

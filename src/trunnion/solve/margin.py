@@ -7,7 +7,6 @@ problem, φ = s law(N(R₀ + G φ)), whose G is triangular by modules, and it is
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -68,10 +67,9 @@ def margin_for_sure(back: Backward, most: float) -> Number:
 
     The margin is more than this. To follow a long row takes seconds. NaN where it is locked.
     """
-    modules = [settled for settled in back.settled if settled.problem is not None and not settled.problem.one_way]
-    sure = 1.0 / largest([module.problem.bound() for module in modules if module.problem is not None] or [0.0])
-    locked = functools.reduce(np.logical_or, [np.less(module.share, 1.0) for module in modules], np.False_)
-    return np.where(locked, np.nan, np.where(sure > most, np.inf, sure))
+    with np.errstate(divide="ignore"):
+        sure = 1.0 / np.asarray(back.bound, float)
+    return np.where(np.less(back.share, 1.0), np.nan, np.where(sure > most, np.inf, sure))
 
 
 def least_beside(

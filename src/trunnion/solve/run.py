@@ -18,9 +18,9 @@ from trunnion.groups.gear import rotation
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly import Chosen, choose
-from trunnion.solve.backward import Backward, Given, Sense, solve
+from trunnion.solve.backward import Backward, Given, Sense, row_code, solve
 from trunnion.solve.bristles import History, histories
-from trunnion.solve.forward import Forward, Travel, forward
+from trunnion.solve.forward import Forward, Travel, forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.inverse import Inverse, driven_at_outputs
 from trunnion.solve.memory import in_blocks, keep_pages
@@ -67,6 +67,18 @@ class Run:
     def walk(self, time: Number) -> Forward:
         """Motion alone at the given times (s)."""
         return forward(self.system, self.values, self.chosen.assembly, time)
+
+    def posed(self, time: NDArray[np.float64], values: Values) -> Forward:
+        """Places alone at the given times (s) with other values; velocities may be missing."""
+        code = row_code(self.system, values, self.chosen.assembly)
+        if code is not None:
+            return code.walked(self.system, values, time)
+        return posed(self.system, values, self.chosen.assembly, time)
+
+    def compile(self, now: bool = True) -> None:
+        """Have a long row solved by machine code; if not `now`, by NumPy until this is called again."""
+        for turned in (False, True):
+            row_code(self.system, self.values, self.chosen.assembly, turned, not now)
 
     def at(
         self,

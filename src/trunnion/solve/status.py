@@ -17,7 +17,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import sticking
 
-__all__ = ["pose_status", "pose_status_number", "status_number", "status_of", "worst_condition"]
+__all__ = ["pose_status", "pose_status_number", "status_number", "status_of"]
 
 
 SINGULAR = 1e6  # condition from which less than about four digits would be left
@@ -38,9 +38,7 @@ def status_number(back: Backward) -> Number:
     """The gravest status in whatever shape the numbers of the walk have."""
     status = pose_status_number(back.walk)
     reasons = [(Status.ZERO_SLIP, back.resting[name]) for name in sticking(back.walk.system)]
-    for settled in back.settled:
-        reasons.append((Status.NOT_CONVERGED, np.logical_not(settled.converged)))
-        reasons.append((Status.LOCKED, np.less(settled.share, 1.0)))
+    reasons += [(Status.NOT_CONVERGED, np.logical_not(back.converged)), (Status.LOCKED, np.less(back.share, 1.0))]
     reactions = (number for reaction in back.reactions.values() for number in flat(tuple(reaction)[:2]))
     forces = (*back.efforts.values(), *back.friction.values(), *reactions)
     reasons.append((Status.NOT_CONVERGED, ~np.isfinite(_sum(forces))))
@@ -52,20 +50,10 @@ def status_number(back: Backward) -> Number:
 
 def pose_status_number(walk: Forward) -> Number:
     """The gravest status that the motion alone decides, in whatever shape its numbers have."""
-    placed: Number = True
-    condition = worst_condition(walk)
-    for pose in walk.poses:
-        for frame in pose.frames:
-            placed = placed & np.isfinite(_sum(flat(frame)))
+    condition = walk.condition
     status = np.where(condition > NEAR_SINGULAR, np.int8(Status.NEAR_SINGULAR), np.int8(Status.SOLVED))
     status = np.where(condition <= SINGULAR, status, np.int8(Status.SINGULAR))
-    return np.where(placed, status, np.int8(Status.NOT_ASSEMBLED))
-
-
-def worst_condition(walk: Forward) -> Number:
-    """Largest condition of a module."""
-    parts = (primal(group.condition(pose)) for group, pose in zip(walk.system.groups, walk.poses, strict=True))
-    return functools.reduce(np.maximum, parts, 1.0)
+    return np.where(walk.assembled, status, np.int8(Status.NOT_ASSEMBLED))
 
 
 def _sum(numbers: Iterable[Number]) -> Number:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -148,6 +148,11 @@ class System:
     def axes(self) -> str:
         """The global axes."""
         return "xyz" if self.spatial else "xy"
+
+    @cached_property
+    def codes(self) -> dict[Hashable, Any]:
+        """Machine code of its walks, see `row_code`; None where there is none."""
+        return {}
 
     @cached_property
     def groups(self) -> tuple[Any, ...]:

@@ -25,7 +25,6 @@ from trunnion.solve.status import (
     pose_status_number,
     status_number,
     status_of,
-    worst_condition,
 )
 from trunnion.solve.system import Values, law_of, rubbing
 
@@ -70,7 +69,7 @@ class WalkKernel(Kernel):
         with np.errstate(all="ignore"):
             back = self.back(values, time)
             status = status_number(back) if self.forces else pose_status_number(back.walk)
-            doubtful = (status > self.gravest) | (worst_condition(back.walk) > BORDER)
+            doubtful = (status > self.gravest) | (back.walk.condition > BORDER)
             for settled in back.settled:
                 doubtful = doubtful | np.logical_not(settled.certain)
             doubtful = doubtful | np.isnan(locking_margin(back))

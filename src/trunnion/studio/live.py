@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward, posed
+from trunnion.solve.forward import Forward
 from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
@@ -32,7 +32,7 @@ __all__ = ["Live", "live_columns", "live_in_space", "places_at", "uncollected"]
 Array = NDArray[np.float64]
 
 AT_ONCE = 12_000  # joints times positions whose forces are worked out in the time of a picture
-MOST_TRACKED = 20_000  # places of all tracks that are drawn in it
+MOST_TRACKED = 6_000  # places of all tracks that are drawn in it: the page writes each as text
 STILL = 1e-9  # of the size: a point that moves less has no track
 MOST_FOLLOWED = 16  # contacts whose friction is followed until they lock: the time grows with their cube
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
@@ -103,7 +103,7 @@ class Live:
     def walk(self) -> Forward:
         """Its motion over the cycle; of many joints the places alone."""
         cycle = self._cycle
-        return cycle.walk if cycle else posed(self.run.system, self.numbers, self.run.chosen.assembly, self.time)
+        return cycle.walk if cycle else self.run.posed(self.time, self.numbers)
 
     @cached_property
     def tracks(self) -> dict[str, Array]:

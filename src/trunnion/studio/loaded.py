@@ -54,12 +54,17 @@ class Loaded:
         """The mechanism prepared; MechanismError if its structure does not determine its motion."""
         if self.mechanism is None:
             raise MechanismError(self.findings)
-        return prepare(self.mechanism)
+        return self._without_code(prepare(self.mechanism))
 
     @cached_property
     def frictionless_run(self) -> Run:
         """The same without friction."""
-        return prepare(self.run.system.mechanism.with_friction("off"))
+        return self._without_code(prepare(self.run.system.mechanism.with_friction("off")))
+
+    def _without_code(self, run: Run) -> Run:
+        """A run whose machine code does not delay the first picture: it is recorded with the figures of the cycle."""
+        run.compile(now=False)
+        return run
 
     @lru_cache(maxsize=2)  # noqa: B019  # a handful of texts is kept, see `loaded`
     def positions(self, steps: int, friction: bool) -> Positions:
@@ -88,6 +93,7 @@ class Loaded:
         from trunnion.cycle.summary import result_of
 
         positions, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
+        run.compile()
         with np.errstate(all="ignore"):
             return result_of(run, over_cycle(run, positions)).dataset
 

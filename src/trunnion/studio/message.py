@@ -2,8 +2,9 @@
 
 uint32 n (little-endian), n bytes of header (a multiple of 4), columns. In the header a column is
 `{"column": [first, count]}`, in numbers from the end of the header; NaN stands where there is none. `{"sum": [first,
-count]}` is the sum of two columns, one behind the other, which has 48 binary digits. A file is `{"bytes": [first,
-count]}`, in bytes from there.
+count]}` is the sum of two columns, one behind the other, which has 48 binary digits. `{"grid": [first, count], "names":
+…, "keys": …}` are columns of so many numbers for each name of each key. A file is `{"bytes": [first, count]}`, in bytes
+from there.
 """
 
 from __future__ import annotations
@@ -37,15 +38,19 @@ def packed(header: Mapping[str, Any]) -> bytes:
 
     def column(numbers: np.ndarray) -> dict[str, Any]:
         nonlocal count
-        columns.append(numbers)
+        columns.append(np.ravel(numbers))
         count += numbers.size
         return {"column": [count - numbers.size, int(numbers.size)]}
 
     def plain(value: Any) -> Any:
         if isinstance(value, Mapping):
+            rows = list(value.values())
+            if (alike := _columns_of(rows)) is not None:
+                first, size = column(np.array(alike))["column"]
+                return {"grid": [first, size // len(alike)], "names": list(rows[0]), "keys": list(map(str, value))}
             return {str(key): plain(item) for key, item in value.items()}
         if isinstance(value, np.ndarray):
-            return column(np.ravel(value))
+            return column(value)
         if isinstance(value, Exact):
             high = value.numbers.astype("<f4").astype(float)
             first, size = column(np.concatenate([high, value.numbers - high]))["column"]
@@ -71,3 +76,12 @@ def packed(header: Mapping[str, Any]) -> bytes:
     text = json.dumps(head, allow_nan=False).encode()  # ASCII: half a character of the page's text comes back as it was
     text += b" " * (-len(text) % 4)
     return struct.pack("<I", len(text)) + text + body + b"".join(files)
+
+
+def _columns_of(rows: list[Any]) -> list[np.ndarray] | None:
+    """The columns of many entries that are alike; None of others."""
+    if len(rows) < SHORTEST or not all(isinstance(row, dict) and row.keys() == rows[0].keys() for row in rows):
+        return None
+    columns = [column for row in rows for column in row.values()]
+    alike = all(type(column) is np.ndarray and column.shape == columns[0].shape for column in columns)
+    return columns if columns and alike else None

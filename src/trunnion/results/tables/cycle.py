@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.results.dataset import Column, flat
+from trunnion.results.dataset import Column, flat, unit_of
 from trunnion.results.variables import VARIABLES
 
 if TYPE_CHECKING:
@@ -79,16 +79,20 @@ def status_column(result: xr.Dataset) -> Column:
 
 def of_members(result: xr.Dataset, dim: str, stems: Stems, has: Has = lambda *_: True) -> Iterator[Column]:
     """The columns of the members of a dimension, one member after another, of variables that the result has."""
+    arrays = {variable: result[variable] for variable in stems if variable in result}  # to look each up takes long
+    values = {variable: array.values for variable, array in arrays.items()}
+    between = {
+        variable: array.dims[1:-1] for variable, array in arrays.items()
+    }  # the members and the positions or times
+    labels = {other: result[other].values.astype(str).tolist() for others in between.values() for other in others}
     for i, member in enumerate(result[dim].values if dim in result.dims else ()):
-        for variable, stem in stems.items():
-            if variable not in result:
-                continue
-            others = result[variable].dims[1:-1]  # between the members and the positions or times
-            for index in product(*(range(result.sizes[other]) for other in others)):
+        for variable, array in arrays.items():
+            others = between[variable]
+            for index in product(*(range(len(labels[other])) for other in others)):
                 if has(i, variable, index):
-                    labels = [str(result[other].values[k]) for other, k in zip(others, index, strict=True)]
-                    name = f"{member}.{'_'.join(filter(None, (stem, *labels)))}"
-                    yield from flat(result, variable, name, (i, *index))
+                    parts = [labels[other][k] for other, k in zip(others, index, strict=True)]
+                    name = f"{member}.{'_'.join(filter(None, (stems[variable], *parts)))}"
+                    yield Column(name, unit_of(array, (i, *index)), values[variable][(i, *index)])
 
 
 def positions(result: xr.Dataset) -> list[Column]:

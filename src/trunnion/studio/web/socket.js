@@ -77,6 +77,11 @@ function unpacked(part, floats) {
     const [first, count] = part.sum;
     return Array.from({ length: count }, (_, index) => floats[first + index] + floats[first + count + index]).map((value) => (Number.isFinite(value) ? value : null));
   }
+  if (keys[0] === "grid") {
+    let [first, count] = part.grid;
+    const column = () => Array.from(floats.subarray(first, (first += count)), (value) => (Number.isFinite(value) ? value : null));
+    return Object.fromEntries(part.keys.map((key) => [key, Object.fromEntries(part.names.map((name) => [name, column()]))]));
+  }
   return Object.fromEntries(keys.map((key) => [key, unpacked(part[key], floats)]));
 }
 

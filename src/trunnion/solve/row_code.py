@@ -1,0 +1,328 @@
+"""A walk forward and back over a long row of modules as machine code.
+
+Of many modules NumPy's calls cost far more than the arithmetic. What `backward.solve` does is recorded once, cut where
+modules end, and compiled; modules that are alike share their code. Positions that this does not decide for sure, as
+those near locking, are solved by NumPy.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Hashable
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from functools import partial
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number, UntraceableError
+from trunnion.engines.graph import BOTH, Graph
+from trunnion.engines.kernel import STRUCTURAL, TIME, literals
+from trunnion.engines.parts import Parts
+from trunnion.engines.recorded import Recorded
+from trunnion.solve.forward import Assembly, Forward, SpatialWalk, forward
+from trunnion.solve.system import System, Values
+
+__all__ = ["RowCode", "code_of", "leaves_of"]
+
+Array = NDArray[np.float64]
+Solve = Callable[[System, Values, Assembly, Number, bool], Any]  # gives a `Backward`
+
+MOST_CODES = 8  # of a system: numbers that are 0 or 1 are compiled in, and to record each choice of them takes seconds
+MOST_FORMS = 16  # of mechanisms whose code is kept at hand
+TRIED = np.array([0.0, 0.0137, 0.137, 1.37])  # s, at which code that was recorded of another mechanism is tried
+NUMBER = re.compile(r"[-+]?\.?\d[\d.]*([eE][-+]?\d+)?( [^-+*/^()]*)?$")  # with its unit, but no expression
+BORDER = 99.0  # condition from which NumPy decides what a position is
+PLAIN = frozenset({float, int, bool, str, np.float64})  # types of numbers that have one value and no derivatives
+NUMBERS = (bool, int, float, np.generic, np.ndarray)
+OF_WALK = ("motions", "poses", "_elements")
+EAGER = ("body_power", "gear_power")  # what has a default is not made when it is asked for
+STATED = ("walk", "travels", "margin_up_to", "margin")  # of a `Backward`, by whoever asks
+
+
+_recorded: dict[Hashable, RowCode] = {}
+
+
+def code_of(
+    system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve, held: bool | None = None
+) -> RowCode | None:
+    """The machine code for such numbers, recorded when it is first asked for; None where there is none.
+
+    Parameters
+    ----------
+    turned
+        Whether positions are passed the other way.
+    solve
+        What is to be compiled: it solves a system with numbers in an assembly at times, s, turned or not.
+    held
+        True: none is recorded until this is called with False.
+    """
+    if system.inverse or not set(map(type, values.values())) <= PLAIN:
+        return None
+    literal = tuple((path, value) for path, value in values.items() if value in STRUCTURAL)
+    key = literal, tuple(placed if isinstance(placed, int) else id(placed) for placed in assembly), turned
+    if key not in system.codes and len(system.codes) >= MOST_CODES:
+        return None
+    if held:
+        system.codes.setdefault(key, None)
+    elif key not in system.codes or (held is False and system.codes[key] is None):
+        system.codes[key] = None
+        with suppress(UntraceableError):
+            system.codes[key] = _of_form((_form(system), *key), system, values, assembly, turned, solve)
+    code: RowCode | None = system.codes[key]
+    return code
+
+
+def _of_form(form: Hashable, system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve) -> RowCode:
+    """The code of another mechanism that differs by numbers alone, if it solves this one too; else one that is new."""
+    code = _recorded.get(form)
+    if code is not None:
+        back, right = code.solved(system, values, TRIED), solve(system, values, assembly, TRIED, turned)
+        if back is not None and _same((back.reactions, back.walk.motions), (right.reactions, right.walk.motions)):
+            return code
+    if len(_recorded) >= MOST_FORMS:
+        _recorded.clear()
+    code = _recorded[form] = RowCode(system, values, assembly, turned, solve)
+    return code
+
+
+def _form(system: System) -> str:
+    """What a mechanism is but for its numbers."""
+
+    def masked(entry: Any) -> Any:
+        if isinstance(entry, dict):
+            return {key: masked(item) for key, item in entry.items()}
+        if isinstance(entry, list):
+            return [masked(item) for item in entry]
+        stated = isinstance(entry, str) and NUMBER.match(entry)
+        return 0 if stated or (isinstance(entry, (int, float)) and not isinstance(entry, bool)) else entry
+
+    entries = masked(system.mechanism.model_dump(mode="json"))
+    return json.dumps({key: entry for key, entry in entries.items() if key not in ("name", "assembly")})
+
+
+class RowCode:
+    """Machine code of `backward.solve` for a system, or of the same passed the other way.
+
+    Raises UntraceableError where the mechanism has what only NumPy does.
+    """
+
+    def __init__(self, system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve) -> None:
+        self.assembly, self.turned, self.solve = assembly, turned, solve
+        graph, literal = Graph(in_parts=True), literals(values)
+        numbers = {path: Recorded(graph, graph.input(path, BOTH)) for path in values if path not in literal}
+        time, conditions = Recorded(graph, graph.input(TIME, BOTH)), list[Number]()
+        with np.errstate(all="ignore"):
+            walk = forward(system, {**literal, **numbers}, assembly, time)
+            for group, pose in zip(system.groups, walk.poses, strict=True):
+                conditions.append(group.condition(pose))
+                graph.cut()
+            back = solve(system, {**literal, **numbers}, assembly, time, turned)
+        self._kind: Any = type("Solved", (_Filled, type(back)), {})
+        self._of_back = [entry.name for entry in fields(back) if entry.name not in STATED]
+        nests = {name: getattr(back.walk, name) for name in OF_WALK}
+        nests |= {name: getattr(back, name) for name in self._of_back}
+        certain, doubts = [settled.certain for settled in back.settled], [Recorded(graph, n) for n in graph.doubts]
+        watched = [leaves_of(part) for part in (conditions, certain, doubts, [back.bound])]
+        recorded = [leaf.node for leaf in leaves_of([nests, watched]) if isinstance(leaf, Recorded)]
+        self._parts = Parts(graph, list(dict.fromkeys(recorded)))
+        places = self._parts.rows
+        self._conditions, self._certain, self._doubts, self._bound = (
+            [places[leaf.node] for leaf in part if isinstance(leaf, Recorded)] for part in watched
+        )
+        # what is in the nests is in one list: the rows of the table, then what is true or false, then what is the same
+        # at all times and for all numbers
+        self._truths = [places[node] for node in dict.fromkeys(recorded) if graph.boolean(node)]
+        truth_at = {row: len(places) + k for k, row in enumerate(self._truths)}
+        self._same: list[Any] = []
+
+        def place(leaf: Any) -> int:
+            if isinstance(leaf, Recorded):
+                row = places[leaf.node]
+                return truth_at.get(row, row)
+            self._same.append(leaf)
+            return len(places) + len(self._truths) + len(self._same) - 1
+
+        placed = {name: _each(nest, place) for name, nest in nests.items()}
+        self._leaves = {name: leaves_of(nest) for name, nest in placed.items()}
+        self._makers = {name: _maker(nest) for name, nest in placed.items()}
+        in_table = range(len(places))
+        forces = [self._leaves[name] for name in ("reactions", "friction", "efforts")]
+        self._forces = [row for rows in forces for row in rows if row in in_table]
+        self._frames = [row for row in self._leaves["motions"] if row in in_table]
+        self._last = max([*self._frames, *self._conditions, *self._doubts], default=0)
+
+    def solved(self, system: System, values: Values, time: Array) -> Any:
+        """Motion and forces at some times, s, a `Backward`; None where NumPy is to find all of them."""
+        table = self._table(values, time)
+        condition = np.max(table[self._conditions], axis=0, initial=1.0)
+        doubtful = ~(condition <= BORDER) | np.any(table[self._certain] == 0.0, axis=0)
+        doubtful |= ~np.isfinite(np.sum(table[self._forces], axis=0)) | np.any(table[self._doubts] != 0.0, axis=0)
+        if doubtful.all():
+            return None
+        entries = _Entries(self._makers, table, self._truths, self._same)
+        bound = np.max(table[self._bound], axis=0, initial=0.0)
+        walk = self._walked(system, values, time, entries)
+        filled = self._kind.__new__(self._kind)
+        filled.__dict__ |= {"_entries": entries, "walk": walk, "travels": False, "margin": None}
+        both: list[tuple[Any, Any]] = [(walk, {"condition": condition, "assembled": ~doubtful}), (filled, {})]
+        both[1][1].update(converged=~doubtful, share=np.where(doubtful, 0.0, 1.0), bound=bound)
+        if doubtful.any():
+            lanes = np.flatnonzero(doubtful)
+            back = self.solve(system, values, self.assembly, time[lanes], self.turned)
+            for name in (*OF_WALK, *self._of_back):
+                if not entries.put(self._leaves[name], getattr(back.walk if name in OF_WALK else back, name), lanes):
+                    return None
+            for (_, worth), of in zip(both, (back.walk, back), strict=True):
+                for name, number in worth.items():
+                    number[lanes] = getattr(of, name)
+        for holder, worth in both:
+            holder.__dict__ |= worth
+        for name in EAGER:
+            setattr(filled, name, entries.made(name))
+        return filled
+
+    def walked(self, system: System, values: Values, time: Array) -> Forward:
+        """Motion alone at some times, s, NaN where it cannot be assembled."""
+        table = self._table(values, time, self._last)
+        walk = self._walked(system, values, time, _Entries(self._makers, table, self._truths, self._same))
+        walk.condition = np.max(table[self._conditions], axis=0, initial=1.0)
+        walk.assembled = np.isfinite(np.sum(table[self._frames], axis=0))
+        return walk
+
+    def _walked(self, system: System, values: Values, time: Array, entries: _Entries) -> Forward:
+        made = _WalkedInSpace if system.spatial else _Walked
+        walk = made.__new__(made)
+        walk.__dict__ |= {"_entries": entries, "system": system, "values": values, "time": time}
+        walk.direction, walk.assembly = -1.0 if self.turned else 1.0, list(self.assembly)
+        return walk
+
+    def _table(self, values: Values, time: Array, last: int | None = None) -> Array:
+        given = [time if path == TIME else values[path] for path in self._parts.inputs]
+        return self._parts.run(given, len(time), last)[:, : len(time)]
+
+
+class _Entries:
+    """What the attributes of a walk and of its forces are made of."""
+
+    def __init__(
+        self, makers: dict[str, Callable[[Any], Any]], table: Array, truths: list[int], same: list[Any]
+    ) -> None:
+        self.makers, self.table, self.truths = makers, table, truths
+        self.others = dict[int, Any]()  # in the place of what is the same elsewhere
+        self._same = same
+        self._row: list[Any] = []
+
+    def made(self, name: str) -> Any:
+        """An attribute."""
+        if not self._row:
+            self._row = [*self.table, *(self.table[self.truths] != 0.0), *self._same]
+            for place, number in self.others.items():
+                self._row[place] = number
+        return self.makers[name](self._row)
+
+    def put(self, leaves: list[int], nest: Any, lanes: NDArray[np.intp]) -> bool:
+        """Put what NumPy found into some lanes; False where it is of another form.
+
+        Also in the place of what is the same elsewhere, as the share that is reached where a module locks.
+        """
+        numbers, rows, first = leaves_of(nest), len(self.table), len(self.table) + len(self.truths)
+        if len(numbers) != len(leaves):
+            return False
+        for place, number in zip(leaves, numbers, strict=True):
+            if place < first:
+                self.table[place if place < rows else self.truths[place - rows], lanes] = number
+            elif isinstance(number, NUMBERS) and np.any(number != self._same[place - first]):
+                same = self._same[place - first]
+                kind = bool if isinstance(same, (bool, np.bool_)) else float
+                self.others[place] = np.full(self.table.shape[1], same, kind)
+                self.others[place][lanes] = number
+        return True
+
+
+class _Filled:
+    """What has its numbers in a table: each attribute is made of them when it is first asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        entries: _Entries | None = self.__dict__.get("_entries")
+        if entries is None or name not in entries.makers:
+            raise AttributeError(name)
+        self.__dict__[name] = value = entries.made(name)
+        return value
+
+
+class _Walked(_Filled, Forward):
+    """Motion in the plane."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "local":
+            return super().__getattr__(name)
+        self.local = self.system.elements(self.values)
+        return self.local
+
+
+class _WalkedInSpace(_Walked, SpatialWalk):
+    """Motion in space."""
+
+
+# ---- nests of tuples, lists, dictionaries and dataclasses ------------------------------------------------------------
+
+
+def _each(nest: Any, change: Callable[[Any], Any]) -> Any:
+    """The same nest with `change` applied to what is in it."""
+    if isinstance(nest, dict):
+        return {key: _each(item, change) for key, item in nest.items()}
+    if isinstance(nest, (tuple, list)):
+        parts = [_each(item, change) for item in nest]
+        return type(nest)(*parts) if hasattr(nest, "_fields") else type(nest)(parts)
+    if is_dataclass(nest):
+        kind: Any = type(nest)
+        return kind(*(_each(getattr(nest, entry.name), change) for entry in fields(nest)))
+    return change(nest)
+
+
+def leaves_of(nest: Any) -> list[Any]:
+    """All that is in a nest, in order."""
+    leaves: list[Any] = []
+    _each(nest, leaves.append)
+    return leaves
+
+
+def _same(nest: Any, other: Any) -> bool:
+    """Whether two nests of numbers are the same but for rounding."""
+    leaves, others = leaves_of(nest), leaves_of(other)
+    if len(leaves) != len(others):
+        return False
+    rows = np.array([np.broadcast_arrays(*pair, TRIED)[:2] for pair in zip(leaves, others, strict=True)], float)
+    size = np.nanmax(np.abs(rows), initial=0.0)
+    return bool(np.allclose(rows[:, 0], rows[:, 1], 1e-8, 1e-10 * size, equal_nan=True))
+
+
+def _maker(nest: Any) -> Callable[[Any], Any]:
+    """What makes such a nest from a row of entries, of places in it."""
+    form: Any = type(nest)
+    if isinstance(nest, dict):
+        parts, form = list(nest.values()), partial(_dictionary, list(nest))
+    elif isinstance(nest, (tuple, list)):
+        parts, form = list(nest), getattr(nest, "_make", form)
+    elif is_dataclass(nest):
+        parts, form = [getattr(nest, entry.name) for entry in fields(nest)], partial(_unpacked, form)
+    else:
+        return itemgetter(nest)
+    if len(parts) > 1 and all(isinstance(part, int) for part in parts):
+        entries = itemgetter(*parts)  # by far the most often
+        return entries if form is tuple else lambda row: form(entries(row))
+    makers = [_maker(part) for part in parts]
+    return lambda row: form([maker(row) for maker in makers])
+
+
+def _dictionary(keys: list[Any], parts: Any) -> dict[Any, Any]:
+    return dict(zip(keys, parts, strict=True))
+
+
+def _unpacked(kind: Callable[..., Any], parts: Any) -> Any:
+    return kind(*parts)

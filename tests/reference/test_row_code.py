@@ -1,0 +1,118 @@
+"""Machine code solves a row of modules as NumPy does, also where it locks, turns round or cannot be assembled."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.studio import chain
+
+from trunnion.algebra.dual import Dual
+from trunnion.engines import parts
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve import backward, row_code
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.margin import margin_in
+from trunnion.solve.row_code import leaves_of
+from trunnion.solve.run import prepare
+from trunnion.solve.status import status_of
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+STEPS = 90
+TEXTS = {
+    "chain": chain(13),
+    **{name: (EXAMPLES / f"{name}.yaml").read_text("utf-8") for name in ("jansen", "drawing-press", "scotch-yoke")},
+    "locked": (EXAMPLES / "drawing-press.yaml").read_text("utf-8").replace("friction: 0.1", "friction: 0.4"),
+    "cardan": (EXAMPLES / "pezzuti-cardan.yaml").read_text("utf-8"),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("positions", [slice(None), slice(7, 8), slice(0, 3)])
+def test_machine_code_solves_as_numpy_does(name, positions, monkeypatch):
+    run = prepare(Mechanism(**entries_of(TEXTS[name])[0]))
+    time = run.cycle.times(STEPS)[positions]
+    ran, run_code = [], parts.Parts.run
+    monkeypatch.setattr(parts.Parts, "run", lambda *given: ran.append(given) or run_code(*given))
+    backs, turned = [], []
+    with np.errstate(all="ignore"):
+        for many in (10**9, 1):
+            monkeypatch.setattr(backward, "MANY_MODULES", many)
+            assert not ran
+            backs.append(run.solve(time, method=FrictionMethod()))
+            turned.append(backward.backward(backs[-1].walk.backward(), FrictionMethod(), backward.Given()))
+        plain, coded = backs
+        margins = [np.broadcast_to(margin_in(back, 3.0), time.shape) for back in backs]
+    assert ran
+    for plain, coded in (backs, turned):
+        _same(plain, coded, time)
+    np.testing.assert_allclose(margins[1], margins[0], rtol=1e-9)
+
+
+def _same(plain, coded, time):
+    """All numbers of both to 1e-10 of their sizes, statuses and rounds alike."""
+    np.testing.assert_array_equal(*(status_of(back, time.shape) for back in (plain, coded)))
+    for name in ("reactions", "friction", "losses", "efforts", "loads", "load_powers", "friction_wrenches"):
+        numbers = [np.array([np.broadcast_to(part, time.shape) for part in leaves_of(getattr(back, name))])
+                   for back in (plain, coded)]  # fmt: skip
+        size = np.nanmax(np.abs(numbers[0]), initial=0.0) if np.isfinite(numbers[0]).any() else 0.0
+        np.testing.assert_allclose(numbers[1], numbers[0], rtol=0, atol=1e-10 * size, err_msg=name)
+    for name in ("body_power", "gear_power"):
+        np.testing.assert_allclose(getattr(coded, name), getattr(plain, name), rtol=1e-9, atol=1e-12)
+    for link, motion in plain.walk.motions.items():
+        parts = [leaves_of(part) for part in (motion, coded.walk.motions[link])]
+        size = max(np.nanmax(np.abs(part), initial=1.0) for part in parts[0])
+        for part, other in zip(*parts, strict=True):
+            np.testing.assert_allclose(other, part, rtol=1e-9, atol=1e-12 * size)
+    for settled, other in zip(plain.settled, coded.settled, strict=True):
+        for what in ("iterations", "converged", "certain", "share"):
+            np.testing.assert_allclose(getattr(other, what), getattr(settled, what), rtol=1e-9, err_msg=what)
+
+
+def test_modules_that_are_alike_share_their_code(monkeypatch):
+    monkeypatch.setattr(parts, "_codes", {})
+    counts = []
+    for dyads in (12, 20):
+        run = prepare(Mechanism(**entries_of(chain(dyads))[0]))
+        run.solve(run.cycle.times(STEPS))
+        counts.append(len(parts._codes))
+    assert counts[0] <= counts[1] <= 20  # of driver, first and last dyad, contacts, masses of links, friction
+
+
+def test_derivatives_are_those_of_numpy(monkeypatch):
+    run = prepare(Mechanism(**entries_of(TEXTS["chain"])[0]))
+    path = "joints.B5.friction.coefficient"
+    values = {**run.values, path: Dual(run.values[path], 1.0)}
+    slopes = []
+    for many in (10**9, 1):
+        monkeypatch.setattr(backward, "MANY_MODULES", many)
+        back = run.solve(run.cycle.times(STEPS), values)
+        parts = [part for wrench in back.reactions.values() for part in tuple(wrench)[:2] if isinstance(part, Dual)]
+        slopes.append(np.array([np.broadcast_to(part.dual, STEPS) for part in parts]))
+    assert np.nanmax(np.abs(slopes[0])) > 0
+    np.testing.assert_allclose(slopes[1], slopes[0], rtol=0, atol=1e-10 * np.nanmax(np.abs(slopes[0])))
+
+
+def test_one_code_serves_mechanisms_that_differ_by_numbers(monkeypatch):
+    monkeypatch.setattr(row_code, "_recorded", {})
+    for length in ("100 mm", "101 mm"):
+        run = prepare(Mechanism(**entries_of(chain(13).replace("c: 100 mm", f"c: {length}"))[0]))
+        time = run.cycle.times(STEPS)
+        with np.errstate(all="ignore"):
+            coded = run.solve(time)
+            monkeypatch.setattr(backward, "MANY_MODULES", 10**9)
+            _same(run.solve(time), coded, time)
+        monkeypatch.setattr(backward, "MANY_MODULES", 12)
+    assert len(row_code._recorded) == 1
+
+
+def test_numpy_solves_until_the_code_is_wanted(monkeypatch):
+    run = prepare(Mechanism(**entries_of(chain(14))[0]))
+    ran, run_code = [], parts.Parts.run
+    monkeypatch.setattr(parts.Parts, "run", lambda *given: ran.append(given) or run_code(*given))
+    run.compile(now=False)
+    run.solve(run.cycle.times(3))
+    assert not ran
+    run.compile()
+    run.solve(run.cycle.times(3))
+    assert ran

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Case, Senses
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import AHEAD, SEVERAL, Integration
-from trunnion.dynamics.rates import Seeing, Seen
+from trunnion.dynamics.rates import Seen
 from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset
@@ -32,7 +32,6 @@ from trunnion.joints.contact import elastic_force
 __all__ = ["ActiveMotion", "Impact", "OpenContact", "step_nodes"]
 
 Array = NDArray[np.float64]
-Rate = Callable[[float, Array], Array]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
 CLOSELY = 33  # times about a largest force
@@ -80,7 +79,6 @@ class ActiveMotion(Integration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.seeing = cast("Seeing", self.dynamics)
         self.count = self.rows = len(self.motion.contacts.each)  # rows of `_gaps`
         self.onsets = (None,) * self.count
         self.now = self.first_now
@@ -95,18 +93,6 @@ class ActiveMotion(Integration):
         self.now = now
         self._decided(time, row)
 
-    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
-        """The derivative of a row by time."""
-        n = self.layout.coordinates
-
-        def rate(moment: float, numbers: Array) -> Array:
-            self.solution.asked += 1
-            inside = numbers.copy()
-            inside[:n] = self._in_range(numbers[:n])
-            return self.seeing.derivative(moment, inside, self.onsets, now, self.senses)
-
-        return rate
-
     # ---- what ends a step -------------------------------------------------------------------------------------
 
     def _at(self, dense: Dense, times: Array) -> Moment:
@@ -117,7 +103,7 @@ class ActiveMotion(Integration):
     def _look(self, dense: Dense, times: Array) -> Seen:
         """The contacts at times of a step."""
         with np.errstate(all="ignore"):
-            return self.seeing.look(self._at(dense, times))
+            return self.dynamics.look(self._at(dense, times))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
         """Those of contacts, then those of joints."""
@@ -132,7 +118,7 @@ class ActiveMotion(Integration):
     def _gaps(self, at: Moment) -> Array:
         """Gaps, m, (contact, lane), negative where a contact that touches is open or another has closed."""
         sign = np.array([1.0 if onset is None else -1.0 for onset in self.onsets])
-        gaps: Array = sign[:, None] * self.seeing.look(at).gap if self.count else np.empty((0, len(at.time)))
+        gaps: Array = sign[:, None] * self.dynamics.look(at).gap if self.count else np.empty((0, len(at.time)))
         return gaps
 
     def _of_joints(self, at: Moment) -> Array:

@@ -13,16 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
-from trunnion.dynamics.rates import WORKS, Rates, Walks
+from trunnion.dynamics.rates import WORKS, Dynamics, Rates
 from trunnion.dynamics.rest import Meanwhile, Rest
 from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import Moment
@@ -37,8 +35,9 @@ ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry mor
 class ClutchRates:
     """The rates of a motion with those of the slip and of what is lost in it beside them."""
 
-    def __init__(self, drive: Drive, inner: CompiledRates | Walks) -> None:
+    def __init__(self, drive: Drive, inner: Dynamics) -> None:
         self.drive, self.inner = drive, inner
+        self.seconds, self.look, self.margins = inner.seconds, inner.look, inner.margins
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
@@ -68,8 +67,7 @@ class ClutchMotion(Integration):
     def __post_init__(self) -> None:
         super().__post_init__()
         (self.drive,) = self.motion.drives.values()
-        self.rates = ClutchRates(self.drive, cast("CompiledRates | Walks", self.dynamics))
-        self.dynamics = self.rates
+        self.dynamics = self.rates = ClutchRates(self.drive, self.dynamics)
         self.meanwhile: Meanwhile | None = None  # what prescribed drivers do while the coordinate rests
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
         self.known = "holds" if self.drive.engaged(self.start) else "opens"
@@ -109,7 +107,7 @@ class ClutchMotion(Integration):
 
     def _carried(self, at: Moment, rests: bool) -> Array:
         """Effort through a clutch that holds, (lane,): the motor's, less what the rotor takes."""
-        second = 0.0 * at.rate[0] if rests else self.rates.inner.seconds(at)[0]
+        second = 0.0 * at.rate[0] if rests else self.dynamics.seconds(at)[0]
         shaft = self.drive.shaft(at.time, at.rate[0], at.integral[0], at.now)
         effort: Array = shaft - self.drive.inertia * self.drive.ratio * second
         return effort

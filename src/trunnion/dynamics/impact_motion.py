@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,9 @@ from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.active import MEET as SLOW
-from trunnion.dynamics.active_motion import ActiveMotion, Dense, Impact, OpenContact, step_nodes
+from trunnion.dynamics.active_motion import ActiveMotion, Impact, OpenContact, step_nodes
 from trunnion.dynamics.bordered import nearest
 from trunnion.dynamics.impact_law import OPEN, Struck, strike
-from trunnion.dynamics.rates import Rigid, Seen
 from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset
@@ -47,7 +45,7 @@ class ImpactMotion(ActiveMotion):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.rows = 2 * self.count
-        self.rigid, each = cast("Rigid", self.dynamics), self.motion.contacts.each
+        each = self.motion.contacts.each
         self.friction = np.array([contact.coefficient for contact in each])
         self.restitution = np.array([contact.restitution for contact in each])
         size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
@@ -56,19 +54,11 @@ class ImpactMotion(ActiveMotion):
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
-    def _touches(self, dense: Dense, times: Array) -> Seen:
-        """The contacts with their forces at times of a step."""
-        with np.errstate(all="ignore"):
-            return self.rigid.touches(self._at(dense, times))
-
     def _gaps(self, at: Moment) -> Array:
         """What stays above 0 within a step, (2 contacts, lane): gap or normal force, and slip or what friction has left
         before it slips."""
         values = np.ones((2 * self.count, len(at.time)))
-        if not any(self.onsets):
-            values[: self.count] = self.rigid.look(at).gap
-            return values
-        touches = self.rigid.touches(at)
+        touches = self.dynamics.look(at)
         for k, onset in enumerate(self.onsets):
             values[k] = touches.normal[k] if onset else touches.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
@@ -81,7 +71,7 @@ class ImpactMotion(ActiveMotion):
         if not self._open:
             return
         times, weights = step_nodes(stretch.begin, stretch.end)
-        touches = self._touches(stretch.state, times)
+        touches = self._look(stretch.state, times)
         for k, contact in self._open.items():
             contact.force = np.fmax(contact.force, float(np.max(touches.normal[k])))
             contact.impulse += float(weights @ touches.normal[k])
@@ -103,7 +93,7 @@ class ImpactMotion(ActiveMotion):
             self._set(dict.fromkeys(together, Closed(0)))
             self._project(time, row)
         else:
-            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[contact, 0]
+            friction = self._look(lambda times: row[:, None], np.array([time])).friction[contact, 0]
             self._set(dict.fromkeys(together, Closed(-int(np.sign(friction)))))
         return np.inf
 
@@ -122,7 +112,7 @@ class ImpactMotion(ActiveMotion):
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
         at = self.moment(time, row, 0.0, 0.0)
-        linear = self.rigid.linear(at)
+        linear = self.motion.linear(at)
         rates = linear.driven + linear.ways @ at.rate[:, 0]
         meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
@@ -264,7 +254,7 @@ class ImpactMotion(ActiveMotion):
         n, closed = self.layout.coordinates, self._closed()
         at = self.moment(time, row, 0.0, 0.0)
         for _ in range(2):
-            linear = self.rigid.linear(at)
+            linear = self.motion.linear(at)
             shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
             if not shut:
                 return
@@ -275,7 +265,7 @@ class ImpactMotion(ActiveMotion):
         if stuck := [k for k, sense in enumerate(self.senses) if sense == 0]:
             row[n : 2 * n] = self.motion.stopped(at, stuck)
             return
-        linear = self.rigid.linear(at)
+        linear = self.motion.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
         row[n : 2 * n] -= nearest(linear.mass, ways, rates[[*closed, *sticks]])

@@ -24,7 +24,7 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
-from trunnion.dynamics.rates import WORKS, Dynamics, Layout, Walks
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment
@@ -110,9 +110,8 @@ class Integration:
         self.first_now = 0.5 * (self.start + self.breaks[0])
         self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
         self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
-        margins = getattr(self.dynamics, "margins", Walks(self.motion).margins)
         self._walked = self.motion.walked[0]
-        self.guards = Guards(self.motion, self.layout, self.limits, margins)
+        self.guards = Guards(self.motion, self.layout, self.limits, self.dynamics.margins)
 
     # ---- the whole way ----------------------------------------------------------------------------------------
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.state import FreeMotion, Linear, Moment
-from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Closed, Contacts
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of, law_parameters
 
@@ -22,13 +22,10 @@ __all__ = [
     "Dynamics",
     "Layout",
     "Rates",
-    "Rigid",
-    "Seeing",
     "Seen",
     "Walks",
     "bristle_rates",
     "powers_of",
-    "seen_of",
     "works_of",
 ]
 
@@ -56,12 +53,6 @@ class Rates(NamedTuple):
     slip: Array = np.empty(0)
 
 
-class Dynamics(Protocol):
-    """What tells the rates at one moment."""
-
-    def __call__(self, at: Moment) -> Rates: ...
-
-
 class Seen(NamedTuple):
     """Of every contact, (contact, lane): gap, m, its rate and slip, m/s, normal force and friction, N."""
 
@@ -72,23 +63,17 @@ class Seen(NamedTuple):
     friction: Array
 
 
-class Seeing(Dynamics, Protocol):
-    """What also tells, of several coordinates, the derivative of a row and how the contacts are in many lanes."""
+class Dynamics(Protocol):
+    """What tells how a motion goes on: the rates at one moment and, of many lanes, the accelerations, (coordinate,
+    lane), the contacts, and 1/condition of the modules of `FreeMotion.meeting`, (module, lane)."""
 
-    def derivative(
-        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
-    ) -> Array: ...
+    def __call__(self, at: Moment) -> Rates: ...
+
+    def seconds(self, at: Moment) -> Array: ...
 
     def look(self, at: Moment) -> Seen: ...
 
-
-class Rigid(Seeing, Protocol):
-    """What also tells the contacts with their forces while some stay closed, in many lanes, and what impulses come
-    to."""
-
-    def touches(self, at: Moment) -> Seen: ...
-
-    def linear(self, at: Moment) -> Linear: ...
+    def margins(self, at: Moment) -> Array: ...
 
 
 class Layout(NamedTuple):
@@ -169,45 +154,26 @@ class Walks:
         return Rates(accelerated.second[:, 0], integral[:, 0], memory, works, sound, locked)
 
     def seconds(self, at: Moment) -> Array:
-        """The accelerations, (coordinate, lane)."""
+        """See `Dynamics`."""
         return self.motion.accelerate(at).second
 
     def margins(self, at: Moment) -> Array:
-        """See `FreeMotion.margins`, (module, lane)."""
+        """See `Dynamics`."""
         with np.errstate(all="ignore"):
             walk = self.motion.walk(at, np.zeros_like(at.q))
             return np.array([np.broadcast_to(margin, at.q.shape[1]) for margin in self.motion.margins(walk)])
 
     def look(self, at: Moment) -> Seen:
-        """See `Seeing`."""
-        motion = self.motion
-        pushes = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
-        return seen_of(pushes, at.q.shape[1])
-
-    def derivative(
-        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
-    ) -> Array:
-        """The derivative of a row; NaN for no answer."""
-        n = self.layout.coordinates
-        at = self.layout.moment(np.array([time]), row[:, None], now=now)
-        with np.errstate(all="ignore"):
-            rates = self(at._replace(onsets=tuple(onsets), senses=senses))
-        return self.layout.row(row[n : 2 * n], rates) if rates.sound else np.full(len(row), np.nan)
-
-    def touches(self, at: Moment) -> Seen:
-        """See `Rigid`."""
-        solved = self.motion.accelerate(at)
-        return seen_of(self.motion.contacts.pushes(solved.back.walk, solved.onsets), at.q.shape[1])
-
-    def linear(self, at: Moment) -> Linear:
-        """See `Rigid`."""
-        return self.motion.linear(at)
-
-
-def seen_of(pushes: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
-    """Of contacts at many moments what is looked at."""
-    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
-    return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
+        """See `Dynamics`."""
+        motion, onsets, lanes = self.motion, at.onsets, at.q.shape[1]
+        if any(isinstance(onset, Closed) for onset in onsets):
+            accelerated = motion.accelerate(at)
+            walk, onsets = accelerated.back.walk, accelerated.onsets
+        else:
+            walk = motion.walk(at, np.zeros_like(at.q))
+        parts = [(state.gap, state.rate, state.slip, push.normal, push.friction)
+                 for state, push in motion.contacts.pushes(walk, onsets)]  # fmt: skip
+        return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
 
 
 def _of_one_lane(numbers: Sequence[Number]) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,14 +10,13 @@ from numpy.typing import NDArray
 
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
-from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
-from trunnion.dynamics.rates import Layout, Walks
+from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
 from trunnion.dynamics.state import FreeMotion
@@ -172,11 +170,12 @@ def _with_play(
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
     times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
-    integrating = _integrating(motion, is_rigid(run.system.mechanism))
+    kind = ImpactMotion if is_rigid(run.system.mechanism) else ActiveMotion
+    rates = rates_of(motion)
 
     def found(tolerance: float) -> Found:
-        integration = integrating(
-            duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
+        integration = kind(
+            motion, rates, duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
         )
         solution = integration.run(row.copy())
 
@@ -186,13 +185,6 @@ def _with_play(
         return Found.of(run, solution, time, between, integration.finished())
 
     return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
-
-
-def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ActiveMotion]:
-    """What integrates a motion with joints in play."""
-    if rigid:
-        return partial(ImpactMotion, motion, compiled_closed(motion) or Walks(motion))
-    return partial(ActiveMotion, motion, rates_of(motion))
 
 
 def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:

@@ -32,7 +32,7 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["Accelerated", "FreeMotion", "Held", "Linear", "Moment", "rates_of", "repeated"]
+__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Moment", "rates_of", "repeated"]
 
 Array = NDArray[np.float64]
 
@@ -91,6 +91,9 @@ class Held(NamedTuple):
     joints: Sequence[int] = ()
     closed: Sequence[int] = ()
     walls: Sequence[int] = ()
+
+
+NONE = Held()
 
 
 class Linear(NamedTuple):
@@ -571,9 +574,6 @@ class FreeMotion:
         count = len(self.names)
         many = repeated(at, count + 1)._replace(rate=np.eye(count, count + 1, 1))
         return self.walk(many, np.zeros((count, count + 1)))
-
-
-NONE = Held()
 
 
 def _differences(speeds: Array) -> tuple[Array, Array]:

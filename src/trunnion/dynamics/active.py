@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.energy import kinetic_energy
-from trunnion.dynamics.state import Accelerated, FreeMotion, Moment, repeated
+from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ActiveSet", "Case", "Lock", "Mode", "Modes", "Senses", "settled"]
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Mode = int | None  # of a row: 0 it holds, +1 or −1 it slips in that sense, None it is open
 Modes = tuple[Mode, ...]
 Senses = tuple[int, ...]
@@ -39,9 +38,7 @@ TINY = 1e-9  # of the accelerations and forces: what is none
 SOON = 1e-3  # of a typical time: how far ahead one looks for the sense of what does not move now
 IDLE = 1e-7  # of a typical speed for a typical rate: what moves a joint as little does not, now
 MOST_CASES = 4096  # which are tried one after the other where changing the worst row comes round
-MOST_MOVED = 6  # joints that may stick, up to which one looks for other accelerations
 INSTANT = 1e-12  # of a typical time: in which a joint locks
-APART = 1e-6  # of the accelerations: those that differ by as much are two
 
 
 def settled(
@@ -263,37 +260,3 @@ class ActiveSet:
         walks = (self.motion.walk(moment, np.zeros_like(at.q)) for moment in (at, after))
         before, left = (float(np.ravel(kinetic_energy(walk))[0]) for walk in walks)
         return Lock(joints, after.rate[:, 0], senses, before - left)
-
-    # ---- other accelerations ----------------------------------------------------------------------------------
-
-    def several(self, at: Moment, may: Sequence[int] = ()) -> bool:
-        """Whether friction allows other accelerations than those of the senses of `at`. They are looked for, from far
-        away, where more of some acceleration takes less effort there."""
-        count, starts = len(self.motion.names), self.motion.far(np.zeros_like(at.q))
-        ends = np.array(list(itertools.product((1.0, -1.0), repeat=len(may)))).T
-        if len(may) > MOST_MOVED or not np.any(
-            self.motion.turning(at, np.repeat(starts, ends.shape[1], axis=1), may, np.tile(ends, (1, 2 * count)))
-        ):
-            return False
-        second = self.motion.accelerate(at).second
-        size = np.maximum(self.motion.unit[:, None], np.max(np.abs(second)))
-        many = repeated(at, 2 * count)
-        for modes in itertools.product((0, 1, -1), repeat=len(may)):
-            case = [modes[may.index(k)] if k in may else sense for k, sense in enumerate(at.senses)]
-            others = self.motion.searched(many._replace(senses=tuple(case)), starts)
-            apart = np.max(np.abs(others.second - second) / size, axis=0) > APART
-            if np.any(self._agrees(others, tuple(case), may) & (others.turned | apart)):
-                return True
-        return False
-
-    def _agrees(self, others: Accelerated, senses: Senses, may: Sequence[int]) -> Flags:
-        """Lanes in which the joints that may stick do what a case says."""
-        agrees = np.array(others.converged)
-        pulls = self.motion.pulls(others.back.walk, len(agrees)) / self.motion.typical[:, None]
-        small = TINY * np.maximum(1.0, np.max(np.abs(pulls), axis=0))
-        for k in may:
-            if senses[k]:
-                agrees &= senses[k] * pulls[k] >= -small
-            elif others.shares is not None:
-                agrees &= np.abs(others.shares[k]) <= 1.0 + SLACK
-        return agrees

@@ -16,13 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolver
 from scipy.optimize import brentq
 
-from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Case, Senses
+from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Senses
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
-from trunnion.dynamics.integrate import AHEAD, SEVERAL, Integration
+from trunnion.dynamics.integrate import AHEAD, Integration
 from trunnion.dynamics.rates import Seen
 from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
@@ -37,7 +36,6 @@ Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 CLOSELY = 33  # times about a largest force
 GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
-FEW = 8  # steps after which one looks for other accelerations
 
 
 class Impact(NamedTuple):
@@ -84,7 +82,6 @@ class ActiveMotion(Integration):
         self.now = self.first_now
         self._open: dict[int, OpenContact] = {}
         self._crossed: int | None = None
-        self._steps = 0
 
     def _begins(self, row: Array) -> bool:
         return self._decided(self.start, row) and super()._begins(row)
@@ -202,7 +199,6 @@ class ActiveMotion(Integration):
                 elif case.senses[k] != 0 and not was:
                     self.solution.events.append(Event(time, "break-away", joint, float(case.senses[k])))
             self._rests(time, row, sticks)
-            self._others(time, row, case)
         return True
 
     def _let(self, time: float, onsets: tuple[Onset, ...]) -> None:
@@ -250,22 +246,6 @@ class ActiveMotion(Integration):
         row[n : 2 * n], self.resting = 0.0, True
         if not before:
             self._note(time, "rest")
-
-    # ---- other accelerations ----------------------------------------------------------------------------------
-
-    def _others(self, time: float, row: Array, case: Case) -> None:
-        """Tell where there are several accelerations."""
-        if not self.motion.resisted or SEVERAL in self.solution.notes:
-            return
-        if self._active.several(self.moment(time, row, 0.0, self.now), case.may):
-            self.solution.notes[SEVERAL] = {"time": time}
-
-    def _end_step(self, solver: OdeSolver, row: Array) -> None:
-        """Look for other accelerations at the end of every few steps."""
-        self._steps += 1
-        if self._steps % FEW == 0:
-            with np.errstate(all="ignore"):
-                self._others(float(solver.t), row, Case(self.senses, self.onsets, (), self.senses))
 
     # ---- what a contact comes to ------------------------------------------------------------------------------
 

@@ -272,7 +272,6 @@ class ImpactMotion(ActiveMotion):
 
     def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""
-        super()._end_step(solver, row)
         if not any(self.onsets):
             return
         time = float(solver.t)

@@ -28,7 +28,6 @@ from trunnion.dynamics.rates import WORKS, Dynamics, Layout
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.stiffness import shortest
 from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
@@ -224,7 +223,8 @@ class Integration:
             self.progress(min(1.0, stretch.end / self.duration))
         spent = self.solution.asked + WALK * (self.motion.walked[0] - self._walked)
         if ended is None and spent > self.evaluations:
-            ended = self._exhausted(stretch)
+            figures = {"count": self.evaluations, "of": self.duration}
+            ended = Ended("simulate.evaluations", stretch.end, figures)
         if ended is not None:
             self.solution.ended = ended
             raise _Over
@@ -238,13 +238,6 @@ class Integration:
 
     def _measured(self, stretch: Stretch) -> None:
         """What contacts come to in a step: nothing, where there are none."""
-
-    def _exhausted(self, stretch: Stretch) -> Ended:
-        """The end where the evaluations are used up, with what makes them so many."""
-        row = stretch.state(np.array([stretch.end]))[:, 0]
-        at = self.moment(stretch.end, row, stretch.sense, stretch.now)
-        figures = shortest(self.motion, at, stretch.end - stretch.begin)
-        return Ended("simulate.evaluations", stretch.end, {"count": self.evaluations, "of": self.duration, **figures})
 
     @property
     def snapshot(self) -> Snapshot | None:
@@ -572,9 +565,9 @@ class Integration:
         return True
 
     def _compare(self, time: float, row: Array, sense: float, now: float) -> None:
-        """Tell where one free coordinate has several accelerations, every few steps: E − T, which is continuous, has
-        other roots than that which is followed where it falls far out."""
-        if self.motion.affine or len(self.motion.names) != 1 or SEVERAL in self.solution.notes:
+        """Tell where there are several accelerations, every few steps: E − T, which is continuous, has other roots than
+        that which is followed where its determinant changes its sign far out."""
+        if self.motion.affine or 0 in self.senses or SEVERAL in self.solution.notes:
             return
         self._doubts += 1
         if self._doubts % LOOKED == 1 and np.any(self.motion.growth(self.moment(time, row, sense, now)) < 0.0):

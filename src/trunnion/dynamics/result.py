@@ -420,11 +420,7 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
         case "simulate.evaluations":
             what = f"{figures['count']:,} evaluations of the forces are used up at {at} of "
             what += f"{readable(figures['of'], 's')}: the motion ends there"
-            if np.isfinite(constant := figures["constant"]):
-                why = f", by {' and '.join(figures['causes'])}" if figures["causes"] else ""
-                what += f". Its shortest time constant is {readable(constant, 's')}{why}, "
-                what += f"{figures['of'] / constant:.3g} of which fit into the stated time"
-            remedy = "check what makes it so fast, ask for a shorter --time or more --evaluations"
+            remedy = "check for a stiff spring, damper or contact on a small mass, ask for a shorter --time or more --evaluations"
             return Finding.error("simulate.evaluations", where, what, remedy, **figures)
         case _:
             what = f"there are no forces or impulses of the contacts that touch at {at} ({state}) under which nothing "

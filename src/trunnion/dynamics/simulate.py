@@ -72,8 +72,7 @@ def simulate(
     steady
         Instead of the motion from its start the cycle that it comes to repeat, see `dynamics.steady_cycle`.
     evaluations
-        Of the accelerations, at most. A motion that needs more ends there, with a finding that names what makes it
-        stiff.
+        Of the accelerations, at most. A motion that needs more ends there, with a finding.
 
     Returns
     -------

@@ -484,14 +484,6 @@ class FreeMotion:
         growth: Array = np.linalg.det(stacks[0]) / np.linalg.det(stacks[1])
         return growth
 
-    def turning(self, at: Moment, second: Array, sticks: Sequence[int], shares: Array) -> NDArray[np.bool_]:
-        """Lanes in which more acceleration takes less effort, under shares of what resists some joints,
-        (joint, lane); one lane of `at`."""
-        count, many = len(self.names), repeated(at, second.shape[1])
-        slopes = self._linearised(many, np.vstack([second, shares]), Held(sticks), self.beginning(many))[1]
-        slopes = slopes[:count, :count] * self.unit[None, :, None]
-        return np.asarray(np.linalg.det(np.moveaxis(slopes, -1, 0)) <= 0.0)
-
     # ---- joints that may stick ------------------------------------------------------------------------------------
 
     def speeds(self, walk: Forward, lanes: int) -> Array:

@@ -13,7 +13,7 @@ from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.opened import Opened
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books
-from trunnion.dynamics.shown import PlayedJoints, Touches, as_stated
+from trunnion.dynamics.shown import Stated, Touches
 from trunnion.dynamics.solution import Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Onset
@@ -37,14 +37,14 @@ class Filling:
 
     def books(self) -> Books:
         """Every variable, over the rows up to where the motion ends; NaN after it."""
-        motion, system = self.motion, self.motion.system
+        motion, stated = self.motion, None if self.stated is None else Stated(self.stated, self.motion.contacts)
+        system = (motion.run if stated is None else stated.run).system
         labels = fill.labels(system)
         arrays = fill.allocate(system, len(self.time))
         rows, which = self.solution.at(self.time)
         layout = self.solution.layout
         seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
         touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(self.time))
-        played = None if self.stated is None else PlayedJoints(self.stated, motion.contacts, len(self.time))
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now, stretch.slips)
@@ -52,21 +52,20 @@ class Filling:
             second, back, onsets = self._solved(at, stretch)
             seconds[:, lanes] = second
             window = slice(int(lanes[0]), int(lanes[-1]) + 1)
-            fill_chunk(arrays, back, at.time, window)
             energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
             touched = motion.contacts.pushes(back.walk, onsets)
             touches.fill(lanes, touched, onsets)
-            if played is not None:
-                played.fill(back, touched, window)
+            shown = back if stated is None else stated.back(back, touched)
+            fill_chunk(arrays, shown, at.time, window)
+            if stated is not None:
+                stated.fill(arrays, shown.walk, touched, window)
         moments = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
             if array.dtype == np.float64:
                 array[..., which < 0] = np.nan
         fill.unwrap(arrays, system, motion.values_at(moments, np.nan_to_num(seconds)), self.time)
         resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
-        if self.stated is not None and played is not None:
-            played.unwrap(self.time)
-            arrays, labels = as_stated(self.stated.run, played, arrays, labels)
+        if stated is not None:
             energies = np.vstack([energies, touches.stored.sum(axis=0)])
         works, sticking = layout.works(rows), self._sticking(which)
         return Books(self.time, arrays, labels, moments, seconds, energies, works, resting, touches, sticking)

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.plane import Wrench
-from trunnion.algebra.space import Screw, moment_at
-from trunnion.algebra.unwrap import unwrap_row
+from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot
-from trunnion.cycle import fill
 from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.opened import Opened, in_play
 from trunnion.dynamics.touching import Contacts, ContactState, Push
-from trunnion.joints.pairs import PAIRS
-from trunnion.results import variables as results
 from trunnion.results.dataset import Variable
 from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_middle
 from trunnion.solve.forward import Forward, SpatialWalk
-from trunnion.solve.run import Run
 
-__all__ = ["CONTACT", "IMPACT", "PlayedJoints", "Touches", "as_stated", "impact_arrays", "impact_figures"]
+__all__ = ["CONTACT", "IMPACT", "Stated", "Touches", "impact_arrays", "impact_figures"]
 
 Array = NDArray[np.float64]
 Touched = Sequence[tuple[ContactState, Push]]
@@ -95,113 +90,66 @@ class Touches(NamedTuple):
         }
 
 
-def as_stated(
-    run: Run, played: PlayedJoints, arrays: Mapping[str, Array], labels: Mapping[str, Sequence[str]]
-) -> tuple[dict[str, Array], dict[str, list[str]]]:
-    """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play."""
-    system = run.system
-    stated_labels, arrays_played = fill.labels(system), played.arrays
-    variables = results.variables(system.mechanism.space)
-    for name, array in arrays.items():
-        if name not in arrays_played or results.SAME_AS.get(name) in arrays_played:
-            continue
-        into, dims = arrays_played[name], variables[name].dims
-        places = [[(i, labels[dim].index(label)) for i, label in enumerate(stated_labels[dim]) if label in labels[dim]]
-                  for dim in dims if dim in stated_labels]  # fmt: skip
-        if not places:
-            into[...] = array
-            continue
-        to, of = (np.ix_(*([pair[side] for pair in place] for place in places)) for side in (0, 1))
-        into[to] = array[of]
-    if system.mechanism.space == "planar":
-        for joint, row in played.rows.items():
-            first, second = (stated_labels["link"].index(link) for link in system.joints[joint][1])
-            for suffix in ("", "_velocity", "_acceleration"):
-                angles = arrays_played[f"link_angle{suffix}"]
-                arrays_played[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
-    return arrays_played, stated_labels
+class Stated:
+    """A motion whose joints in play were taken out, as one of the mechanism that was stated."""
 
+    def __init__(self, opened: Opened, contacts: Contacts) -> None:
+        self.run, self.parts, self.contacts = opened.run, opened.parts, contacts
+        self.cut = in_play(self.run.system.mechanism)
+        local, holes = self.run.system.elements(self.run.values), self.run.system.holes(self.run.values)
+        self.local = {**local, **{key: hole for key, hole in holes.items() if key[1] in self.cut}}
 
-@dataclass
-class PlayedJoints:
-    """Motion and reaction of the joints that the opened mechanism does not have. arrays: of the mechanism as stated,
-    in which their rows alone are filled; times: how many there are."""
-
-    opened: Opened
-    contacts: Contacts
-    times: int
-    arrays: dict[str, Array] = field(init=False)
-
-    def __post_init__(self) -> None:
-        system = self.opened.run.system
-        self.arrays = fill.allocate(system, self.times)
-        self.cut = in_play(system.mechanism)
-        self.rows = {joint: k for k, joint in enumerate(system.joints) if joint in (*self.cut, *self.opened.parts)}
-        for name, array in self.arrays.items():
-            if "joint" in results.variables(system.mechanism.space)[name].dims:
-                array[list(self.rows.values())] = np.nan
-
-    def fill(self, back: Backward, touched: Touched, window: slice) -> None:
-        """The rows of one walk of the opened mechanism."""
-        run = self.opened.run
-        local = run.system.elements(run.values)
-        own_holes = {key: hole for key, hole in run.system.holes(run.values).items() if key[1] in self.cut}
-        motions = {link: back.walk.motions[link] for link in run.system.mechanism.effective_links}
-        walk = type(back.walk)(run.system, run.values, {**local, **own_holes}, motions, back.walk.time)
-        for joint, row in self.rows.items():
-            reaction, rubbing, lost = self._wrenches(back, joint, touched)
-            self.arrays["friction_power"][row, window] = lost
+    def back(self, back: Backward, touched: Touched) -> Backward:
+        """What a walk of the opened mechanism came to, with the stated joints: those in play have the forces of their
+        contacts, those that chains stand in for the reaction of the last part."""
+        system, opened = replace(self.run.system), back.walk.system
+        vars(system)["groups"] = opened.groups
+        values, local = {**self.run.values, **back.walk.values}, {**self.local, **back.walk.local}
+        motions = {link: back.walk.motions[link] for link in system.mechanism.effective_links}
+        walk = type(back.walk)(system, values, local, motions, back.walk.time, poses=back.walk.poses)
+        zero, joints = walk.algebra.ZERO_LOAD, [*self.cut, *self.parts]
+        reactions, rubbing = dict(back.reactions), {**back.friction_wrenches, **dict.fromkeys(joints, zero)}
+        friction: dict[str, Any] = {**back.friction, **dict.fromkeys(joints, 0.0)}
+        for joint in joints:
+            reaction = back.reactions[self.parts[joint][-1]] if joint in self.parts else zero
+            second = system.joints[joint][1][1]
+            for contact, (state, push) in zip(self.contacts.each, touched, strict=True):
+                if contact.joint == joint:
+                    along = push._replace(normal=0.0 * push.normal)
+                    reaction = walk.algebra.added(reaction, dict(contact.action(back.walk, state, push).on)[second])
+                    loss = dict(contact.action(back.walk, state, along).on)[second]
+                    rubbing[joint] = walk.algebra.added(rubbing[joint], loss)
             if isinstance(walk, SpatialWalk):
-                self._fill_in_space(walk, joint, row, window, reaction, rubbing)
-            else:
-                self._fill_in_plane(walk, joint, row, window, reaction)
+                friction[joint] = dot(moment_at(rubbing[joint], bearing_middle(walk, joint)), walk.ends(joint)[1].z)
+            else:  # about the joint's point on the second link
+                moment = walk.algebra.moment_at(reaction, walk.point(second, joint).place)
+                reaction = Wrench(reaction.x, reaction.y, moment)
+                friction[joint] = moment if system.turns(joint) else 0.0
+            reactions[joint] = reaction
+        return replace(
+            back, walk=walk, reactions=reactions, friction=friction, friction_wrenches=rubbing, margin=None,
+            losses={**dict.fromkeys(joints, 0.0), **back.losses},
+            resting={**dict.fromkeys(joints, np.False_), **back.resting},
+        )  # fmt: skip
 
-    def _fill_in_space(
-        self, walk: SpatialWalk, joint: str, row: int, window: slice, reaction: Screw, rubbing: Screw
-    ) -> None:
-        fill.fill_joint(self.arrays, walk, row, joint, window)
-        middle, axis = bearing_middle(walk, joint), walk.ends(joint)[1].z
-        fill.put(self.arrays["reaction_force"], row, reaction.u, window)
-        fill.put(self.arrays["reaction_moment"], row, moment_at(reaction, middle), window)
-        fill.put(self.arrays["friction_moment"], row, moment_at(rubbing, middle), window)
-        self.arrays["friction_torque"][row, window] = dot(moment_at(rubbing, middle), axis)
-        self.arrays["friction_force"][row, window] = dot(rubbing.u, axis)
-        fill.fill_bearing(self.arrays, walk, row, joint, reaction, rubbing, window)
-
-    def _fill_in_plane(self, walk: Forward, joint: str, row: int, window: slice, reaction: Any) -> None:
-        point = walk.point(walk.system.joints[joint][1][1], joint).place
-        fill.put(self.arrays["reaction_force"], row, reaction[:2], window)
-        moment, turns = walk.algebra.moment_at(reaction, point), walk.system.turns(joint)
-        for name in ("reaction_moment", "friction_torque", "friction_force"):
-            self.arrays[name][row, window] = 0.0
-        self.arrays["friction_torque" if turns else "reaction_moment"][row, window] = moment
-        fill.fill_bearing(self.arrays, walk, row, joint, Wrench(reaction.x, reaction.y, moment), None, window)
-        motion = walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint)
-        for suffix, numbers in zip(("", "_velocity", "_acceleration"), motion, strict=True):
-            self.arrays[f"joint_slide{suffix}"][row, window] = numbers[1]
-
-    def _wrenches(self, back: Backward, joint: str, touched: Touched) -> tuple[Any, Any, Array | float]:
-        """What a joint does to its second link, all and by friction, and what is lost to this, W."""
-        algebra = back.walk.algebra
-        reaction, rubbing, lost = algebra.ZERO_LOAD, algebra.ZERO_LOAD, np.zeros(1)
-        if joint in self.opened.parts:
-            return back.reactions[self.opened.parts[joint][-1]], rubbing, 0.0
-        second = self.opened.run.system.joints[joint][1][1]
-        for contact, (state, push) in zip(self.contacts.each, touched, strict=True):
-            if contact.joint == joint:
-                along = push._replace(normal=0.0 * push.normal)
-                reaction = algebra.added(reaction, dict(contact.action(back.walk, state, push).on)[second])
-                rubbing = algebra.added(rubbing, dict(contact.action(back.walk, state, along).on)[second])
-                lost = lost - push.friction * state.slip
-        return reaction, rubbing, lost
-
-    def unwrap(self, time: Array) -> None:
-        """Rotations in space without jumps of a whole turn."""
-        step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-        system = self.opened.run.system
-        for joint, row in self.rows.items() if system.mechanism.space == "spatial" else ():
-            if PAIRS[system.joints[joint][0]].angle:
-                unwrap_row(self.arrays["joint_rotation"][row], self.arrays["joint_rotation_velocity"][row], step)
+    def fill(self, arrays: Mapping[str, Array], walk: Forward, touched: Touched, window: slice) -> None:
+        """What joints in play have beside what any joint has: the power lost in their contacts, and in the plane how
+        they slide and turn."""
+        for joint in self.cut:
+            row = list(self.run.system.joints).index(joint)
+            arrays["friction_power"][row, window] = -sum(
+                push.friction * state.slip
+                for contact, (state, push) in zip(self.contacts.each, touched, strict=True)
+                if contact.joint == joint
+            )
+            if isinstance(walk, SpatialWalk):
+                continue
+            first, second = (walk.motions[link] for link in walk.system.joints[joint][1])
+            arrays["joint_rotation_velocity"][row, window] = second.twist.w - first.twist.w
+            arrays["joint_rotation_acceleration"][row, window] = second.acceleration.w - first.acceleration.w
+            motion = walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint)
+            for suffix, numbers in zip(("", "_velocity", "_acceleration"), motion, strict=True):
+                arrays[f"joint_slide{suffix}"][row, window] = numbers[1]
 
 
 def impact_arrays(impacts: Sequence[Impact]) -> dict[str, Array]:

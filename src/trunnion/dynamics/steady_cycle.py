@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.compiled_rates import CompiledRates, rates_of
+from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import FINEST, integration_of
 from trunnion.dynamics.rates import Layout, Walks
-from trunnion.dynamics.result import motion_findings
 from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import Places, initial_row, places
 from trunnion.dynamics.started import DriveCourse

@@ -33,7 +33,7 @@ class Bridged:
     places: of change points; period: after which they come again, None if they do not.
     """
 
-    inner: Any
+    inner: Dynamics
     places: Sequence[float]
     period: float | None
     width: float
@@ -45,7 +45,7 @@ class Bridged:
             away -= self.period * np.round(away / self.period)
         nearest = float(away[np.argmin(np.abs(away))])
         if not abs(nearest) < self.width:
-            return self.inner(at)  # type: ignore[no-any-return]
+            return self.inner(at)
         about = [self.inner(at._replace(q=at.q - nearest + place * self.width)) for place in PLACES]
         columns = [
             carried_on(self.width * PLACES, np.array([getattr(state, key) for state in about], float).T, nearest)
@@ -59,14 +59,14 @@ class Bridged:
         return getattr(self.inner, name)
 
 
-def bridged(motion: FreeMotion, rates: Any) -> Dynamics:
+def bridged(motion: FreeMotion, rates: Dynamics) -> Dynamics:
     """The rates of a motion, through the change points that it passes where nothing rubs."""
     system, run = motion.system, motion.run
     if len(system.mechanism.drivers) != 1 or felt(system, motion.values):
-        return rates  # type: ignore[no-any-return]
+        return rates
     times = [time for number, met in run.chosen.meetings.items() if motion.passes(number) for time in met.crossed]
     if not times:
-        return rates  # type: ignore[no-any-return]
+        return rates
     (name,) = system.mechanism.drivers
     places = [float(np.ravel(primal(system.drive(run.values, name, time)[0]))[0]) for time in times]
     span, periodic = float(np.ravel(system.span(run.values, name).peak)[0]) * run.cycle.duration, run.cycle.periodic

@@ -21,7 +21,7 @@ from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
-from trunnion.dynamics.steady import steady as steady_result
+from trunnion.dynamics.steady_cycle import steady as steady_result
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism

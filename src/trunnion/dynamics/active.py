@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
@@ -175,16 +175,15 @@ class ActiveSet:
     ) -> dict[int, Mode]:
         """The worst of the contacts that pull, sink in, or slip or stick against their friction, with those on its
         wall, and what they seem to do instead. contacts: those that were closed, with their senses."""
-        pull = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
-        pull *= small * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
+        pull = self.motion.size * small * self.motion.pace**2
         force, worst = TINY * self.motion.force, list[tuple[float, int, Mode]]()
         for k, before in contacts.items():
             contact, onset = self.motion.contacts.each[k], answer.onsets[k]
-            gap, slip = (float(np.ravel(part)[0]) for part in contact.accelerations(answer.back.walk))
+            gap, slip = (single(part) for part in contact.accelerations(answer.back.walk))
             if not isinstance(onset, Closed):
                 worst.append((-gap / pull, k, before))
                 continue
-            normal, friction = (float(np.ravel(part)[0]) for part in (onset.normal, onset.friction))
+            normal, friction = (single(part) for part in (onset.normal, onset.friction))
             worst.append((-normal / force, k, None))
             if onset.sense == 0:
                 worst.append(((abs(friction) - contact.coefficient * normal) / force, k, -int(np.sign(friction))))
@@ -258,5 +257,5 @@ class ActiveSet:
         if self.of(after, senses).senses is None:
             return None
         walks = (self.motion.walk(moment, np.zeros_like(at.q)) for moment in (at, after))
-        before, left = (float(np.ravel(kinetic_energy(walk))[0]) for walk in walks)
+        before, left = (single(kinetic_energy(walk)) for walk in walks)
         return Lock(joints, after.rate[:, 0], senses, before - left)

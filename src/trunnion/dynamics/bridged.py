@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.rates import Dynamics, Rates
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.change_points import carried_on
@@ -68,9 +68,9 @@ def bridged(motion: FreeMotion, rates: Dynamics) -> Dynamics:
     if not times:
         return rates
     (name,) = system.mechanism.drivers
-    places = [float(np.ravel(primal(system.drive(run.values, name, time)[0]))[0]) for time in times]
-    span, periodic = float(np.ravel(system.span(run.values, name).peak)[0]) * run.cycle.duration, run.cycle.periodic
-    width = WIDTH if system.turns(name) else WIDTH * float(np.ravel(system.size(run.values))[0])
+    places = [single(system.drive(run.values, name, time)[0]) for time in times]
+    span, periodic = single(system.span(run.values, name).peak) * run.cycle.duration, run.cycle.periodic
+    width = WIDTH if system.turns(name) else WIDTH * motion.size
     ordered = np.sort(places)
     gaps = np.diff([*ordered, ordered[0] + span] if periodic else ordered)
     width = min([width, *(gap / APART for gap in gaps)])

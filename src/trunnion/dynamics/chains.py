@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import moment_at
 from trunnion.errors import Finding, MechanismError
@@ -47,7 +47,7 @@ def chain_of_joint(run: Run, walk: Forward, joint: str) -> Chain:
     one_element, two = (_plain(element) for element in walk.ends(joint))
     if kind == "cylindrical":  # it keeps its elements, and with them its turn and its slide
         (turn, slide), rates = walk.coordinates(joint), walk.rates(joint)
-        start = [(_number(turn), _number(rates[0])), (_number(slide), _number(rates[1]))]
+        start = [(single(turn), single(rates[0])), (single(slide), single(rates[1]))]
         local = [_plain(walk.local[link, joint]) for link in (first, second)]
         at = [_point(np.array(frame.place), np.array(frame.z), np.array(frame.x)) for frame in local]
         return _chained(joint, (first, second), "RP", (2, 2), (at[0], at[1]), start)
@@ -70,7 +70,7 @@ def hanging_chain(run: Run, walk: Forward, link: str) -> Chain:
 def _counted(walk: Forward, name: str, links: tuple[str, str], kinds: str, basis: Array, place: Sequence[Any]) -> Chain:
     """A chain whose coordinates are 0 at the start, along and about the rows of `basis`, from a place, m."""
     order = [kinds[:k].count(kind) if kinds != "PPR" or kind == "P" else 2 for k, kind in enumerate(kinds)]
-    at = np.array([_number(part) for part in place])
+    at = np.array([single(part) for part in place])
     frames, twists = (
         [_plain(getattr(walk.motions[link], part)) for link in links] for part in ("frame", "twist")
     )  # fmt: skip
@@ -160,8 +160,4 @@ def _relative(walk: Forward, first: str, second: str) -> Array:
 
 def _plain(numbers: Any) -> Any:
     """Numbers of one lane as floats."""
-    return each(numbers, _number)
-
-
-def _number(value: object) -> float:
-    return float(np.ravel(primal(value))[0])
+    return each(numbers, single)

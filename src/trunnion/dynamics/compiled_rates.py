@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
 from trunnion.dynamics.rates import Layout, Rates, Seen, Walks, bristle_rates, works_of
@@ -194,7 +194,7 @@ class Program:
 
         values = _numbers(motion)
         self.lanes, self.width, self.onsets = MOST_LANES, vector_width(), code.onsets
-        self.numbers = {path: np.array([float(np.ravel(primal(values[path]))[0])]) for path in code.paths}
+        self.numbers = {path: np.array([single(values[path])]) for path in code.paths}
         self.numbers.update({name: np.zeros(1) for name in code.onsets})
         self.state = np.zeros((len(code.states), self.lanes))
         self.numbers.update(zip(code.states, self.state, strict=True))

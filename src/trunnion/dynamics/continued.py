@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import single
 from trunnion.dynamics.checks import refuse, refuse_undetermined
 from trunnion.dynamics.compiled_rates import Codes, CompiledRates, rates_of
 from trunnion.dynamics.filling import Filling
@@ -72,7 +73,7 @@ class Continued:
         self.inputs = {applied_to(name): 0.0 for name in self.motion.names}
         for path, entry in mechanism.parameter_set.entries.items():
             if path.startswith("loads.") and ".resisting" not in path and not entry.varies:
-                self.inputs[path] = float(np.ravel(np.asarray(self.run.values[path]))[0])
+                self.inputs[path] = single(self.run.values[path])
         self._varied, self._applied = frozenset(self.inputs), dict[str, float]()
         self._codes: Codes = {}
         self._places, self._row, self._senses = places(self.motion), initial_row(self.motion), tuple[int, ...]()

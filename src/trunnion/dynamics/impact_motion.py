@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.active import MEET as SLOW
 from trunnion.dynamics.active_motion import ActiveMotion, Impact, OpenContact, step_nodes
 from trunnion.dynamics.bordered import nearest
@@ -48,9 +48,10 @@ class ImpactMotion(ActiveMotion):
         each = self.motion.contacts.each
         self.friction = np.array([contact.coefficient for contact in each])
         self.restitution = np.array([contact.restitution for contact in each])
-        size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
         self.meet = MEET * self.motion.contacts.least_clearance
-        self.low = np.array([max(LOW * contact.clearance, ROUNDED * size) for contact in self.motion.contacts.each])
+        self.low = np.array(
+            [max(LOW * contact.clearance, ROUNDED * self.motion.size) for contact in self.motion.contacts.each]
+        )
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
@@ -153,10 +154,7 @@ class ImpactMotion(ActiveMotion):
             return 0.0
         free = at._replace(onsets=(None,) * self.count)
         still, struck_so = (self.motion.solve(free, second) for second in (0.0 * at.q, change[:, None]))
-        put_in = sum(
-            float(np.ravel(primal((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)))[0])
-            for name in names
-        )
+        put_in = sum(single((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)) for name in names)
         rows = [*places, *(self.count + k for k in places)]
         return put_in - float(struck.impulse @ driven[rows])
 
@@ -187,7 +185,7 @@ class ImpactMotion(ActiveMotion):
         walk = self.motion.accelerate(self.moment(time, after, 0.0, 0.0)._replace(onsets=onsets)).back.walk
         for i, k in enumerate(places):
             speed, e = max(float(struck.after[i]), 0.0), float(self.restitution[k])
-            pull = -float(np.ravel(self.motion.contacts.each[k].accelerations(walk)[0])[0])
+            pull = -single(self.motion.contacts.each[k].accelerations(walk)[0])
             if pull > 0.0 and e > 0.0 and k in free:
                 low = 0.5 * speed * speed / pull < self.low[k]
                 if low or i in rebounds:

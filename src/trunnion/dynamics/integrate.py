@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
+from trunnion.algebra.dual import single
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
@@ -496,8 +497,7 @@ class Integration:
     def _absolute(self, row: Array) -> Array:
         """Absolute tolerances: a share of what is typical of each number."""
         n, system = self.layout.coordinates, self.motion.system
-        size = float(np.ravel(system.size(self.motion.values))[0])
-        sizes = np.array([1.0 if system.turns(name) else size for name in self.motion.names])
+        sizes = np.array([1.0 if system.turns(name) else self.motion.size for name in self.motion.names])
         tolerances = np.full(len(row), self.tolerance)
         tolerances[:n] *= 0.01 * sizes
         tolerances[n : 2 * n] *= 0.01 * self.pace
@@ -613,4 +613,4 @@ class Integration:
 
     def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
         at = self.moment(time, row, sense, now)
-        return float(np.ravel(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))[0])
+        return single(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))

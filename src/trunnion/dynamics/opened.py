@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.algebra.nested import flat
 from trunnion.dynamics.chains import Chain, chain_of_joint, hanging_chain
 from trunnion.dynamics.rates import Layout
@@ -129,14 +129,10 @@ def _start(run: Run) -> Forward:
     return motion.walk(at, np.zeros_like(at.q))
 
 
-def _number(value: object) -> float:
-    return float(np.ravel(primal(value))[0])
-
-
 def _coordinate(walk: Forward, joint: str) -> tuple[float, float]:
     """Coordinate of a joint and its rate at the start."""
     which = 0 if walk.system.turns(joint) else 1
-    return _number(walk.coordinates(joint)[which]), _number(walk.rates(joint)[which])
+    return single(walk.coordinates(joint)[which]), single(walk.rates(joint)[which])
 
 
 # ---- links that no joint holds --------------------------------------------------------------------------------
@@ -174,20 +170,20 @@ def _hang(data: dict[str, Any], ground: str, link: str, walk: Forward) -> dict[s
     for name, kind, pair in zip(names, ("prismatic", "prismatic", "revolute"), ends, strict=True):
         data["joints"][name] = {"type": kind, "links": pair, "friction": 0, "seat": "free"}
     at, frame, twist = walk.at(link, place), walk.motions[link].frame, walk.motions[link].twist
-    angle = np.arctan2(_number(frame.s), _number(frame.c))
+    angle = np.arctan2(single(frame.s), single(frame.c))
     return {
-        along: (_number(at.place[0]), _number(at.velocity[0])),
-        across: (_number(at.place[1]), _number(at.velocity[1])),
-        turn: (float(angle), _number(twist.w)),
+        along: (single(at.place[0]), single(at.velocity[0])),
+        across: (single(at.place[1]), single(at.velocity[1])),
+        turn: (float(angle), single(twist.w)),
     }
 
 
 def _turning_point(data: Mapping[str, Any], link: str, walk: Forward) -> tuple[float, ...]:
     """The mass centre of a link; beside it where a joint is, for two that turn at one point move nothing."""
-    x, y = (_number(part) for part in walk.system.centre(walk.values, link))
+    x, y = (single(part) for part in walk.system.centre(walk.values, link))
     joints = [name for name, joint in data["joints"].items() if link in joint["links"]]
-    places = {tuple(_number(walk.values[f"links.{link}.points.{name}.{axis}"]) for axis in "xy") for name in joints}
-    return (x + BESIDE * _number(walk.system.size(walk.values)) if (x, y) in places else x), y
+    places = {tuple(single(walk.values[f"links.{link}.points.{name}.{axis}"]) for axis in "xy") for name in joints}
+    return (x + BESIDE * single(walk.system.size(walk.values)) if (x, y) in places else x), y
 
 
 # ---- chains in space ------------------------------------------------------------------------------------------
@@ -272,7 +268,7 @@ def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, f
 
     What they are stated to do otherwise is next to nothing, in the time of one cycle: it chooses the assembly there.
     """
-    size, duration = _number(run.system.size(run.values)), run.cycle.duration or 1.0
+    size, duration = single(run.system.size(run.values)), run.cycle.duration or 1.0
     drivers_made: dict[str, dict[str, Any]] = {}
     for name, (coordinate, rate) in coordinates.items():
         span = SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size)

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Contacts
@@ -177,7 +177,7 @@ class Walks:
 
 
 def _of_one_lane(numbers: Sequence[Number]) -> Array:
-    return np.array([float(np.ravel(primal(number))[0]) for number in numbers])
+    return np.array([single(number) for number in numbers])
 
 
 def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:

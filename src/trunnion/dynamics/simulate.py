@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import single
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_rates import rates_of
@@ -167,7 +168,7 @@ def _with_play(
     row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
     check_start(motion, row, limits)
     refuse_massless(motion, row)
-    fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
+    fine = tolerance * min(1.0, contacts.least_clearance / single(run.system.size(run.values)))
     times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
     kind = ImpactMotion if is_rigid(run.system.mechanism) else ActiveMotion
     rates = rates_of(motion)
@@ -195,7 +196,7 @@ def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float
             raise MechanismError(Finding(what, f"drivers.{name}.initial", "begin within the range"))
     at = Layout.of(motion).moment(np.zeros(1), row[:, None])
     for module, margin in zip(motion.meeting, motion.margins(motion.walk(at, np.zeros_like(at.q))), strict=True):
-        if np.ravel(margin)[0] < TOUCHING:
+        if single(margin) < TOUCHING:
             links = ", ".join(motion.system.plan.modules[module].links)
             what = f"begins at a change point: two assembly modes of the links {links} coincide there"
             raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin elsewhere"))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
@@ -36,10 +36,6 @@ class Places:
     meetings: tuple[tuple[float, int], ...] = ()
 
 
-def _number(values: object) -> float:
-    return float(np.ravel(primal(values))[0])
-
-
 def initial_row(motion: FreeMotion) -> Array:
     """The state at the start: coordinates and speeds as stated, else at rest where the driver starts."""
     values, layout = motion.values, Layout.of(motion)
@@ -47,8 +43,8 @@ def initial_row(motion: FreeMotion) -> Array:
     for i, name in enumerate(motion.names):
         path = f"drivers.{name}"
         begin = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(values, name)).value
-        row[i] = _number(values.get(f"{path}.initial.coordinate", begin))
-        row[layout.coordinates + i] = _number(values.get(f"{path}.initial.speed", 0.0))
+        row[i] = single(values.get(f"{path}.initial.coordinate", begin))
+        row[layout.coordinates + i] = single(values.get(f"{path}.initial.speed", 0.0))
     return row
 
 
@@ -60,7 +56,7 @@ def ranges(motion: FreeMotion, drivers: Iterable[str], load_places: Places) -> d
     for name in drivers:
         ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
         if name in motion.names and None not in ends:
-            ranges_stated[name] = min(map(_number, ends)), max(map(_number, ends))
+            ranges_stated[name] = min(map(single, ends)), max(map(single, ends))
     return ranges_stated
 
 
@@ -70,8 +66,8 @@ def load_times(motion: FreeMotion, duration: float) -> list[float]:
     instants, grid = list[float](), np.linspace(0.0, duration, SCANNED)
     for name, table in mechanism.tables.items():
         if table.over == "time":
-            knots = np.array([_number(motion.values[f"tables.{name}.points.{k}.at"]) for k in range(len(table.points))])
-            period = _number(motion.values.get(f"tables.{name}.period", knots[-1] - knots[0]))
+            knots = np.array([single(motion.values[f"tables.{name}.points.{k}.at"]) for k in range(len(table.points))])
+            period = single(motion.values.get(f"tables.{name}.period", knots[-1] - knots[0]))
             laps = np.arange(int(duration / period) + 2) * period if table.repeats and period > 0 else np.zeros(1)
             instants += list((knots + laps[:, None]).ravel())
     for entry in mechanism.parameter_set.entries.values():
@@ -95,7 +91,7 @@ def places(motion: FreeMotion) -> Places:
         return Places()
     run, cycle, (name,) = motion.run, motion.cycle, motion.names
     nominal = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(run.values, name))
-    begin, speed = _number(nominal.value), _number(nominal.rate)
+    begin, speed = single(nominal.value), single(nominal.rate)
     meetings = [
         (time, module)
         for module, each in run.chosen.meetings.items()

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.bordered import RANK, nearest, newton_step
 from trunnion.dynamics.followed import Followed, Snapshot, follows
@@ -149,6 +149,16 @@ class FreeMotion:
         return self.run.cycle
 
     @cached_property
+    def size(self) -> float:
+        """A typical length, m."""
+        return single(self.system.size(self.values))
+
+    @cached_property
+    def pace(self) -> float:
+        """A typical angular speed, rad/s."""
+        return single(self.system.pace(self.values))
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The free drivers."""
         return tuple(self.drives)
@@ -196,21 +206,17 @@ class FreeMotion:
         return self._typical(self.resisted)
 
     def _typical(self, joints: Sequence[str]) -> Array:
-        pace = max(float(np.ravel(primal(self.system.pace(self.values)))[0]), 1e-300)
-        size = float(np.ravel(self.system.size(self.values))[0])
-        return np.array([pace * pace * (1.0 if self.system.turns(name) else size) for name in joints])
+        pace = max(self.pace, 1e-300)
+        return np.array([pace * pace * (1.0 if self.system.turns(name) else self.size) for name in joints])
 
     @cached_property
     def force(self) -> float:
         """A typical force, N."""
-        size, mass = float(np.ravel(self.system.size(self.values))[0]), 0.0
-        pace = float(np.ravel(primal(self.system.pace(self.values)))[0])
+        mass = 0.0
         for link in self.system.mechanism.effective_links:
-            mass += self._number(f"links.{link}.mass") + self._number(f"links.{link}.inertia") / size**2
-        return max(mass * size * pace * pace, 1e-300)
-
-    def _number(self, path: str) -> float:
-        return float(np.ravel(primal(self.values.get(path, 0.0)))[0])
+            inertia = self.values.get(f"links.{link}.inertia", 0.0)  # in space it is told by axes
+            mass += single(self.values.get(f"links.{link}.mass", 0.0)) + single(inertia) / self.size**2
+        return max(mass * self.size * self.pace * self.pace, 1e-300)
 
     @cached_property
     def trial(self) -> Array:
@@ -218,9 +224,8 @@ class FreeMotion:
 
         The typical one, or that of a fall where it is more, so that weights leave its digits.
         """
-        size = float(np.ravel(self.system.size(self.values))[0])
-        gravity = np.hypot.reduce([float(np.ravel(primal(g))[0]) for g in self.system.vector(self.values, "gravity")])
-        fall = [gravity / (size if self.system.turns(name) else 1.0) for name in self.names]
+        gravity = np.hypot.reduce([single(g) for g in self.system.vector(self.values, "gravity")])
+        fall = [gravity / (self.size if self.system.turns(name) else 1.0) for name in self.names]
         return np.maximum(self.unit, fall)
 
     @cached_property
@@ -513,7 +518,7 @@ class FreeMotion:
         ways, speeds = ways[list(sticks)], speeds[list(sticks)]
         if active.closed:
             linear, rows = self.linear(at), [*active.closed, *(len(at.onsets) + k for k in active.walls)]
-            speed = float(np.ravel(self.system.size(self.values) * primal(self.system.pace(self.values)))[0])
+            speed = self.size * self.pace
             ways = np.vstack([ways, linear.ways[rows] * scale / speed])
             speeds = np.concatenate([speeds, (linear.driven + linear.ways @ at.rate[:, 0])[rows] / speed])
         mass = self._mass(at) * scale * scale[:, None]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.cycle import summary
 from trunnion.cycle.positions import Positions, positions
 from trunnion.dynamics.compiled_rates import rates_of
@@ -207,7 +207,7 @@ class Section:
         span = load_places.period if load_places.period is not None else TURN
         start, gone = float(course.coordinate[0, 0]), course.travel
         sense = 1.0 if course.coordinate[-1, -1] > start else -1.0
-        self.begin = float(np.ravel(primal(motion.system.drive(motion.values, motion.names[first], 0.0)[0]))[0])
+        self.begin = single(motion.system.drive(motion.values, motion.names[first], 0.0)[0])
         ahead = np.mod(sense * (self.begin - start), span)
         passed = ahead + span * np.floor((gone - ahead) / span)
         time, before = (course.at(max(at, 0.0), course.time) for at in (passed, passed - span))
@@ -219,7 +219,7 @@ class Section:
         idle = [2 * n + i for i, drive in drives if not drive.controlled]
         self.which = np.delete(np.arange(3 * n + self.layout.bristles), [first, *idle])
         self.turning = np.array([k < n and motion.system.turns(names[k]) for k in self.which], bool)
-        speed, size = abs(float(self.row[n + first])), float(np.ravel(motion.system.size(motion.values))[0])
+        speed, size = abs(float(self.row[n + first])), motion.size
         sizes = np.array([1.0 if motion.system.turns(name) else size for name in names])
         bristles = np.maximum(np.abs(self.row[3 * n : self.layout.slip]), 1e-6 * size)
         self.scale = np.concatenate([sizes, speed * sizes, speed * self.takes * sizes, bristles])[self.which]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.bordered import RANK
-from trunnion.dynamics.energy import kinetic_energy
+from trunnion.dynamics.rates import kinetic_energy
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
 

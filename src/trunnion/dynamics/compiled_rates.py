@@ -31,12 +31,7 @@ from trunnion.engines.kernel import literals
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = [
-    "Codes",
-    "CompiledRates",
-    "compilable",
-    "rates_of",
-]
+__all__ = ["Codes", "CompiledRates", "compilable", "rates_of"]
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.dynamics.checks import refuse, refuse_undetermined
 from trunnion.dynamics.compiled_rates import Codes, CompiledRates, rates_of
-from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.filling import Books, Filling
 from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.integrate import Integration
@@ -18,7 +18,6 @@ from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import integration_of
 from trunnion.dynamics.rates import Walks
-from trunnion.dynamics.result import Books
 from trunnion.dynamics.simulate import check_start
 from trunnion.dynamics.solution import CLOSE, Solution
 from trunnion.dynamics.start import initial_row, places, ranges

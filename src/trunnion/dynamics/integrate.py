@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
 from trunnion.algebra.dual import single
-from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
-from trunnion.dynamics.rates import WORKS, Dynamics, Layout
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment

@@ -1,8 +1,9 @@
-"""Rates of everything that is integrated in time, and how it stands in one row of numbers."""
+"""Rates of everything that is integrated in time, how it stands in one row of numbers, and the energy of a motion."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,23 +14,16 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Contacts
 from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.system import law_of, law_parameters
 
 __all__ = [
-    "CLUTCH",
-    "CONTACT",
-    "WORKS",
-    "Dynamics",
-    "Layout",
-    "Rates",
-    "Seen",
-    "Walks",
-    "bristle_rates",
-    "powers_of",
-    "works_of",
-]
+    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "bristle_rates", "kinetic_energy",
+    "potential_energy", "powers_of", "works_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
+
 
 # what is integrated to make the books: by the drivers (freed or not), loads and springs into the mechanism, to
 # friction, and of joints in play to the contacts
@@ -212,3 +206,40 @@ def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> list[Number
         decay = law.relaxation(slip, **law_parameters(law, motion.values, joint))
         rates.append(slip - decay * deflection)
     return rates
+
+
+def kinetic_energy(walk: Forward) -> Number:
+    """T = ½ Σ (m v² + ωᵀ J ω), J.
+
+    Worked out from the momenta, as the inertia loads of links that stand still and are accelerated at their velocities:
+    so that a body is described once, by its inertia load.
+    """
+    algebra, system = walk.algebra, walk.system
+    moved = {
+        link: Motion(motion.frame, algebra.times(0.0, motion.twist), type(motion.acceleration)(*motion.twist))
+        for link, motion in walk.motions.items()
+    }
+    still, energy = replace(walk, motions=moved), 0.0
+    for link in system.mechanism.effective_links:
+        if link == system.mechanism.fixed_link:
+            continue
+        mass, moment = walk.values[f"links.{link}.mass"], still.inertia_moment(link)
+        centre = still.at(link, system.centre(walk.values, link))
+        force = tuple(-mass * a for a in centre.acceleration)
+        load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
+        energy = energy - 0.5 * algebra.power(load, walk.motions[link].twist)
+    return energy
+
+
+def potential_energy(walk: Forward) -> Number:
+    """−Σ m g·r, J: of gravity, against the origin of the ground."""
+    system, energy = walk.system, 0.0
+    gravity = system.vector(walk.values, "gravity")
+    if not any(np.any(part) for part in gravity):
+        return 0.0
+    for link in system.mechanism.effective_links:
+        if link != system.mechanism.fixed_link:
+            place = walk.at(link, system.centre(walk.values, link)).place
+            for g, coordinate in zip(gravity, place, strict=True):
+                energy = energy - walk.values[f"links.{link}.mass"] * g * coordinate
+    return energy

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,16 +14,25 @@ from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.active_motion import Impact
+from trunnion.dynamics.filling import (
+    CONTACT,
+    FEWEST,
+    FREQUENCY,
+    IMPACT,
+    SPECTRUM,
+    Books,
+    impact_arrays,
+    impact_figures,
+    spectrum,
+)
 from trunnion.dynamics.findings import motion_findings, stated_drivers, undefined
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
-from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
 from trunnion.dynamics.solution import Event, Solution
-from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
 from trunnion.dynamics.started import steady_figures
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
@@ -36,7 +45,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOTION", "Books", "Found", "result_of"]
+__all__ = ["MOTION", "Found", "result_of"]
 
 Array = NDArray[np.float64]
 
@@ -63,23 +72,6 @@ WORDS = dict(zip((*WORKS, IN_CONTACTS, CLUTCH), (
     "work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
     "work lost in contacts", "work lost in the clutch",
 ), strict=True))  # fmt: skip
-
-
-class Books(NamedTuple):
-    """What is known at the rows of a result: variables as `analyse` has them, state, accelerations of the free
-    coordinates, kinetic and potential energy, works, where the mechanism rests, and (joint, time) which
-    joints stick."""
-
-    time: Array
-    arrays: Mapping[str, Array]
-    labels: dict[str, list[str]]
-    at: Moment
-    seconds: Array
-    energies: Array
-    works: Array
-    resting: NDArray[np.bool_]
-    touches: Touches | None = None
-    sticking: NDArray[np.bool_] | None = None
 
 
 class Course(NamedTuple):

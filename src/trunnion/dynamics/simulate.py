@@ -12,17 +12,17 @@ from trunnion.algebra.dual import single
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_rates import rates_of
-from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.filling import Books, Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
 from trunnion.dynamics.rates import Layout
-from trunnion.dynamics.result import Books, Found, result_of
+from trunnion.dynamics.result import Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.steady_cycle import steady as steady_result
+from trunnion.dynamics.touching import contacts_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism

@@ -10,9 +10,8 @@ complementarity, and so is which joints lock where there is none: see `active`. 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +22,12 @@ from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import AHEAD, Integration
 from trunnion.dynamics.rates import Seen
-from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset
 from trunnion.joints.contact import elastic_force
 
-__all__ = ["ActiveMotion", "Impact", "OpenContact", "step_nodes"]
+__all__ = ["ActiveMotion", "OpenContact", "step_nodes"]
 
 Array = NDArray[np.float64]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
@@ -36,23 +35,6 @@ Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 CLOSELY = 33  # times about a largest force
 GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
-
-
-class Impact(NamedTuple):
-    """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
-    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s,
-    and what the contact law has lost, J."""
-
-    label: str
-    begin: float
-    end: float
-    approach: float
-    separation: float
-    force: float
-    depth: float
-    wear: float
-    impulse: float
-    loss: float = 0.0
 
 
 @dataclass
@@ -71,9 +53,7 @@ class OpenContact:
 
 @dataclass
 class ActiveMotion(Integration):
-    """An integration that follows contacts and what sticks. impacts: contacts that are over."""
-
-    impacts: list[Impact] = field(default_factory=list)
+    """An integration that follows contacts and what sticks."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -160,7 +140,7 @@ class ActiveMotion(Integration):
 
     def _end(self, k: int, time: float, rate: float) -> None:
         """A contact lifts off."""
-        self.impacts.append(self._impact_of(k, self._open.pop(k), time, rate))
+        self.solution.impacts.append(self._impact_of(k, self._open.pop(k), time, rate))
         self._say(time, "lift-off", k, rate)
 
     def _impact_of(self, k: int, contact: OpenContact, end: float, rate: float) -> Impact:
@@ -295,10 +275,12 @@ class ActiveMotion(Integration):
             peak = max(peak, _peak(close.normal[k] if what > 0 else -close.gap[k]))
         return peak
 
-    def finished(self) -> list[Impact]:
-        """All contacts, those that last at the end with an end that is not known."""
-        last = [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
-        return sorted([*self.impacts, *last], key=lambda impact: impact.begin)
+    def run(self, row: Array) -> Solution:
+        """The motion from an initial row; contacts that last at its end have an end that is not known."""
+        super().run(row)
+        self.solution.impacts += [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
+        self.solution.impacts.sort(key=lambda impact: impact.begin)
+        return self.solution
 
 
 def step_nodes(begin: float, end: float) -> tuple[Array, Array]:

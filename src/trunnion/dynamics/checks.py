@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import single
 from trunnion.dynamics.opened import in_play, of_several
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
@@ -14,13 +15,15 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
+from trunnion.solve.change_points import TOUCHING
 from trunnion.solve.run import Run
 
-__all__ = ["refuse", "refuse_massless", "refuse_undetermined"]
+__all__ = ["check_start", "refuse", "refuse_massless", "refuse_undetermined"]
 
 Array = NDArray[np.float64]
 
 SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none
+BESIDE, MASSLESS = 0.1, 1e-15  # rad, or of the size: how far from the start more inertia may be; a share that is none
 SMOOTH = [name for name, law in FRICTION_LAWS.items() if not law.interval_at_rest]
 
 
@@ -61,6 +64,30 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
     what += f"{', '.join(joints)} are in play"
     remedy = "state its mass and inertia, or let fewer of its joints be in play"
     raise MechanismError(Finding(what, f"links.{(light or list(links))[0]}", remedy))
+
+
+def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
+    """MechanismError for a start outside a range, at a change point, or where nothing moves that has a mass."""
+    for name, (low, high) in limits.items():
+        place = row[motion.names.index(name)]
+        if not low <= place <= high:
+            what = f"begins at {place:g} (SI), outside its range from {low:g} to {high:g}"
+            raise MechanismError(Finding(what, f"drivers.{name}.initial", "begin within the range"))
+    at = Layout.of(motion).moment(np.zeros(1), row[:, None])
+    for module, margin in zip(motion.meeting, motion.margins(motion.walk(at, np.zeros_like(at.q))), strict=True):
+        if single(margin) < TOUCHING:
+            links = ", ".join(motion.system.plan.modules[module].links)
+            what = f"begins at a change point: two assembly modes of the links {links} coincide there"
+            raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin elsewhere"))
+    if len(motion.names) != 1:
+        return
+    rows = np.repeat(row[:, None], 2, axis=1)
+    rows[0, 1] += BESIDE * (1.0 if motion.system.turns(motion.names[0]) else motion.size)
+    inertia, shifted = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
+    if inertia < MASSLESS * shifted:
+        what = "begins where nothing moves that has a mass, as at a dead centre, so that it has no acceleration there"
+        remedy = "state the inertia of the link or the rotor that it turns, or begin elsewhere"
+        raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", remedy))
 
 
 def _heavy(motion: FreeMotion, link: str) -> bool:

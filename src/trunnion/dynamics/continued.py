@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import single
-from trunnion.dynamics.checks import refuse, refuse_undetermined
+from trunnion.dynamics.checks import check_start, refuse, refuse_undetermined
 from trunnion.dynamics.compiled_rates import Codes, CompiledRates, rates_of
 from trunnion.dynamics.filling import Books, Filling
 from trunnion.dynamics.findings import motion_findings
@@ -18,9 +18,8 @@ from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import integration_of
 from trunnion.dynamics.rates import Walks
-from trunnion.dynamics.simulate import check_start
 from trunnion.dynamics.solution import CLOSE, Solution
-from trunnion.dynamics.start import initial_row, places, ranges
+from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
@@ -76,7 +75,7 @@ class Continued:
         self._varied, self._applied = frozenset(self.inputs), dict[str, float]()
         self._codes: Codes = {}
         self._places, self._row, self._senses = places(self.motion), initial_row(self.motion), tuple[int, ...]()
-        check_start(self.motion, self._row, ranges(self.motion, self.motion.names, self._places))
+        check_start(self.motion, self._row, self._places.limits)
         self._snapshot: Snapshot | None = None
         self._rates: CompiledRates | Walks = Walks(self.motion)
         self._end: Books | None = None

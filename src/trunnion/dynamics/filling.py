@@ -19,11 +19,10 @@ from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot
 from trunnion.cycle import fill
 from trunnion.cycle.fill import fill_chunk
-from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.opened import Opened, in_play
 from trunnion.dynamics.rates import kinetic_energy, potential_energy
 from trunnion.dynamics.rest import Rest
-from trunnion.dynamics.solution import Solution, Stretch
+from trunnion.dynamics.solution import Impact, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
 from trunnion.errors import Status

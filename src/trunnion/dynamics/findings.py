@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.findings import effort_units
-from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import Ended, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion
@@ -32,16 +31,14 @@ def stated_drivers(motion: FreeMotion, run: Run) -> list[str]:
     return [name for name in motion.names if name in run.system.mechanism.drivers]
 
 
-def motion_findings(
-    motion: FreeMotion, solution: Solution, run: Run, impacts: Sequence[Impact] = ()
-) -> Iterator[Finding]:
-    """What is to be known of a motion. run: of the mechanism as it is stated; impacts: of joints in play."""
+def motion_findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterator[Finding]:
+    """What is to be known of a motion. run: of the mechanism as it is stated."""
     yield from (finding for finding in motion.run.chosen.findings if finding.code != "assembly.change_point")
     if centred := [finding.joint for finding in motion.run.seats]:
         what = f"pins of {', '.join(centred)} are taken in the middle of their holes: a seat that follows the load is "
         what += "left out"
         yield Finding.note("simulate.centred", "", what, joints=centred)
-    yield from _of_contacts(motion, run, impacts)
+    yield from _of_contacts(motion, run, solution)
     if several := solution.notes.get("simulate.several_accelerations"):
         what = f"from {readable(several['time'], 's')} on there are several accelerations: friction that grows with "
         what += "the acceleration allows others than that which is followed (Painlevé's paradox)"
@@ -201,11 +198,12 @@ def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[
     return acting, acting - forward if ahead else acting + backward
 
 
-def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
+def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:
     """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in; what is
     lost in contacts that begin so slowly that their law is not followed."""
     for contact in motion.contacts.each:
-        where, of_contact = f"joints.{contact.joint}.contact", [each for each in impacts if each.label == contact.label]
+        where = f"joints.{contact.joint}.contact"
+        of_contact = [impact for impact in solution.impacts if impact.label == contact.label]
         slow = [impact for impact in of_contact if impact.approach < SLOWEST]
         lost, total = (sum(impact.loss for impact in group) for group in (slow, of_contact))
         if len(slow) > FEW and lost > DIFFERS * total:

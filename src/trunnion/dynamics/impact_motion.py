@@ -17,10 +17,10 @@ from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.active import MEET as SLOW
-from trunnion.dynamics.active_motion import ActiveMotion, Impact, OpenContact, step_nodes
+from trunnion.dynamics.active_motion import ActiveMotion, OpenContact, step_nodes
 from trunnion.dynamics.bordered import nearest
 from trunnion.dynamics.impact_law import OPEN, Struck, strike
-from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.solution import Event, Impact, Stretch
 from trunnion.dynamics.state import Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
@@ -213,7 +213,7 @@ class ImpactMotion(ActiveMotion):
                     self._end(k, time, float(struck.after[i]))
             elif case is not OPEN:
                 label, rate = self.motion.contacts.labels[k], float(struck.after[i])
-                self.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
+                self.solution.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
         if self.senses:

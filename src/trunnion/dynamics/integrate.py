@@ -12,7 +12,7 @@ which it would break away forward and backward; see `rest`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -27,6 +27,7 @@ from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossin
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
+from trunnion.dynamics.start import Places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
@@ -74,30 +75,25 @@ class Passing(NamedTuple):
 class Integration:
     """One motion from its initial state.
 
-    bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
-    limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
-    reached; times: s, at which a load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK;
-    meetings: see `Places`; onsets, senses: how contacts and joints that may stick are, see `Moment`; start: time, s, at
-    which it begins; duration: at which it ends.
+    progress: told the share of the duration that is reached; times: s, at which a load jumps or bends; evaluations: of
+    the forces, at most, a walk counted as WALK; onsets, senses: how contacts and joints that may stick are, see
+    `Moment`; start: time, s, at which it begins; duration: at which it ends.
     """
 
     motion: FreeMotion
     dynamics: Dynamics
     duration: float
     tolerance: float
-    bends: Sequence[float] = ()
-    period: float | None = None
-    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    places: Places = field(default_factory=Places)
     progress: Callable[[float], None] | None = None
     times: Sequence[float] = ()
     evaluations: int = MOST_EVALUATIONS
-    meetings: Sequence[tuple[float, int]] = ()
     onsets: tuple[Onset, ...] = ()
     senses: tuple[int, ...] = ()
     start: float = 0.0
 
     def __post_init__(self) -> None:
-        self.layout = Layout.of(self.motion)
+        self.layout, self.bends = Layout.of(self.motion), self.places.bends
         self.solution = Solution(self.layout)
         switch_times = [time for drive in self.motion.drives.values() for time in drive.times]
         times = {time for time in (*switch_times, *self.times) if self.start < time < self.duration}
@@ -108,9 +104,9 @@ class Integration:
         self.breaks = [*sorted(times), self.duration]
         self.first_now = 0.5 * (self.start + self.breaks[0])
         self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
-        self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
+        self.ends = np.array([self.places.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         self._walked = self.motion.walked[0]
-        self.guards = Guards(self.motion, self.layout, self.limits, self.dynamics.margins)
+        self.guards = Guards(self.motion, self.layout, self.places.limits, self.dynamics.margins)
 
     # ---- the whole way ----------------------------------------------------------------------------------------
 
@@ -190,7 +186,7 @@ class Integration:
             if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
                 ahead = at.q + np.sign(row[n]) * self._inside(row[0])
                 second = self.dynamics(at._replace(q=ahead)).second
-                self.bends = (*self.bends, float(row[0] % self.period if self.period else row[0]))
+                self.bends = (*self.bends, float(row[0] % self.places.period if self.places.period else row[0]))
         if not np.all(np.isfinite(second)):
             cause = self._cause(start, row, sense, now) or "no_acceleration"
             if self._locked(start, row, sense, now, [cause]):
@@ -344,7 +340,7 @@ class Integration:
 
     def _in_range(self, coordinates: Array) -> Array:
         """Coordinates of which none is beyond its range, where no force may be known."""
-        return np.clip(coordinates, *self.ends) if self.limits else coordinates
+        return np.clip(coordinates, *self.ends) if self.places.limits else coordinates
 
     def _solver(
         self, rate: Callable[[float, Array], Array], begin: float, row: Array, end: float, absolute: Array,
@@ -473,9 +469,9 @@ class Integration:
 
     def _meeting(self, coordinate: float) -> int | None:
         """The module of which two assemblies meet at a bend, if they do."""
-        for meeting, module in self.meetings:
-            apart = coordinate - meeting
-            apart -= self.period * round(apart / self.period) if self.period and np.isfinite(apart) else 0.0
+        for meeting, module in self.places.meetings:
+            apart, period = coordinate - meeting, self.places.period
+            apart -= period * round(apart / period) if period and np.isfinite(apart) else 0.0
             if abs(apart) < NEAR * max(1.0, abs(coordinate)):
                 return module
         return None
@@ -515,7 +511,7 @@ class Integration:
         bends = np.asarray(self.bends, float)
         low, high = (float(end) for end in self.ends[:, 0])
         if len(bends):
-            period = 0.0 if self.period is None else self.period
+            period = self.places.period or 0.0
             laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else [0.0]
             every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
             near = 1e-12 * max(1.0, abs(q))

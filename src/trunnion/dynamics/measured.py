@@ -140,7 +140,8 @@ def figures_in_time(
         try:
             motion = FreeMotion.of(Run(run.system, alone, run.system.cycle(alone), run.chosen))
             load_places, row = places(motion), initial_row(motion)
-            if not load_places.limits[0] <= row[0] <= load_places.limits[1]:
+            limits = load_places.limits.items()
+            if any(not low <= row[motion.names.index(name)] <= high for name, (low, high) in limits):
                 continue
             rates = rates_of(motion, codes, varied)
             solution = integration_of(motion, rates, load_places, duration, tolerance).run(row)

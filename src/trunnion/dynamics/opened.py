@@ -39,7 +39,7 @@ from trunnion.solve.run import Run
 from trunnion.structure.decompose import decompose, mobility_by_formula
 from trunnion.structure.passive import passive
 
-__all__ = ["Opened", "in_play", "is_rigid", "of_several", "opened"]
+__all__ = ["Opened", "in_play", "of_several", "opened"]
 
 Array = NDArray[np.float64]
 
@@ -70,11 +70,6 @@ class Opened:
 def in_play(mechanism: Mechanism) -> list[str]:
     """Joints that state a contact."""
     return [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
-
-
-def is_rigid(mechanism: Mechanism) -> bool:
-    """Whether the joints in play are between bodies that do not give."""
-    return any(joint.contact.of.rigid for joint in mechanism.effective_joints.values() if joint.contact is not None)
 
 
 def opened(run: Run) -> Opened:

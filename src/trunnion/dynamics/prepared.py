@@ -17,9 +17,10 @@ import numpy as np
 from trunnion.algebra.dual import single
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.clutch_motion import ClutchMotion
+from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics, Rates
-from trunnion.dynamics.start import Places, load_times, ranges
+from trunnion.dynamics.start import Places, load_times
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.change_points import carried_on
 from trunnion.solve.system import felt
@@ -92,15 +93,12 @@ def integration_of(
     senses: tuple[int, ...] = (),
 ) -> Integration:  # fmt: skip
     """What integrates a motion. duration, evaluations, start, senses: see `Integration`."""
-    times = load_times(motion, duration)
-    limits = ranges(motion, motion.names, load_places)
-    if motion.resisted:
-        return ActiveMotion(
-            motion, rates, duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations,
-            senses=senses, start=start,
-        )  # fmt: skip
-    kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration
+    contacts, kind = motion.contacts.each, Integration
+    if motion.resisted or contacts:
+        kind = ImpactMotion if any(contact.rigid for contact in contacts) else ActiveMotion
+    elif any(drive.clutched for drive in motion.drives.values()):
+        kind = ClutchMotion
     return kind(
-        motion, bridged(motion, rates), duration, tolerance, load_places.bends, load_places.period, limits, progress,
-        times, evaluations, load_places.meetings, start=start,
+        motion, bridged(motion, rates), duration, tolerance, load_places, progress, load_times(motion, duration),
+        evaluations, senses=senses, start=start,
     )  # fmt: skip

@@ -13,7 +13,6 @@ from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
-from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.filling import (
     CONTACT,
     FEWEST,
@@ -27,7 +26,6 @@ from trunnion.dynamics.filling import (
 )
 from trunnion.dynamics.findings import motion_findings, stated_drivers, undefined
 from trunnion.dynamics.motor import switched
-from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.solution import Event, Solution
@@ -140,22 +138,18 @@ class Course(NamedTuple):
 
 
 class Found(NamedTuple):
-    """A motion with its books at its rows, and its course, None if it does not begin; impacts: of joints in play."""
+    """A motion with its books at its rows, and its course, None if it does not begin."""
 
     solution: Solution
     books: Books
     course: Course | None
-    impacts: Sequence[Impact] = ()
 
     @classmethod
-    def of(
-        cls, run: Run, solution: Solution, time: Array, between: Callable[[Array], Books],
-        impacts: Sequence[Impact] = (),
-    ) -> Found:  # fmt: skip
+    def of(cls, run: Run, solution: Solution, time: Array, between: Callable[[Array], Books]) -> Found:
         """time: s, of the rows, up to the end; between: the books at some rising times, s."""
         if solution.ended is not None:
             time = np.append(time[time < solution.end], solution.end)
-        return cls(solution, between(time), Course.of(run, solution, between), impacts)
+        return cls(solution, between(time), Course.of(run, solution, between))
 
     @property
     def share(self) -> float:
@@ -167,13 +161,13 @@ class Found(NamedTuple):
 
 def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: Run | None = None) -> Result:
     """The result of a motion in time. nominal: the mechanism as it was stated, where joints in play were taken out."""
-    solution, books, impacts = integrated.solution, integrated.books, integrated.impacts
+    solution, books = integrated.solution, integrated.books
     run = nominal or motion.run
     _note_switches(motion, solution)
     mechanism, system = run.system.mechanism, run.system
     scales = integrated.course.scales if integrated.course else largest(run, books.arrays)
     findings = [
-        *motion_findings(motion, solution, run, impacts),
+        *motion_findings(motion, solution, run),
         *_unbalanced(integrated),
         *undefined(books.time, books.arrays["status"]),
     ]
@@ -184,7 +178,7 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: R
             "free_drivers": stated_drivers(motion, run),
             "duration": duration,
             "findings": finding_rows(findings),
-            **(_named_contacts(motion, impacts) if nominal else {}),
+            **(_named_contacts(motion, solution) if nominal else {}),
             **scales.summary(_summary(motion, integrated, run, scales)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
@@ -203,11 +197,13 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: R
         if nominal is not None and books.touches is not None:
             labels["contact"] = list(motion.contacts.labels)
             parts |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
-                impact_arrays(impacts), IMPACT
+                impact_arrays(solution.impacts), IMPACT
             )
             rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
             rows = rows if solution.ended is None else rows[:-1]  # the end is not evenly spaced
-            if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
+            if len(rows) >= FEWEST and not any(
+                contact.rigid for contact in motion.contacts.each
+            ):  # an impact of rigid bodies has no force
                 along["frequency"] = FREQUENCY
                 coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
                 parts |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
@@ -216,10 +212,10 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: R
     return Result(attributes, build)
 
 
-def _named_contacts(motion: FreeMotion, impacts: Sequence[Impact]) -> dict[str, list[str]]:
+def _named_contacts(motion: FreeMotion, solution: Solution) -> dict[str, list[str]]:
     """The contact of every impact, and the contacts that are pins in holes."""
     pins = [contact.label for contact in motion.contacts.each if contact.bored]
-    return {"impacts": [contact.label for contact in impacts], "contact_pins": pins}
+    return {"impacts": [contact.label for contact in solution.impacts], "contact_pins": pins}
 
 
 def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> dict[str, Any]:
@@ -322,7 +318,7 @@ def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) ->
         for i, joint in enumerate(run.system.joints):
             if (peak := course.reaction(i))[0] > 0:
                 figures.append(_largest(f"{joint}.reaction_max", f"reaction in {joint}", "N", *peak))
-    figures += impact_figures(motion.contacts.labels, integrated.impacts, solution.end)
+    figures += impact_figures(motion.contacts.labels, solution.impacts, solution.end)
     for key, work in _works(solution, course.last.works).items():
         if abs(work[0]) > scales.floor("J"):
             figures.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
 
-__all__ = ["Places", "initial_row", "load_times", "places", "ranges"]
+__all__ = ["Places", "initial_row", "load_times", "places"]
 
 Array = NDArray[np.float64]
 
@@ -23,16 +23,15 @@ CLOSE = 1e-9  # of the way: bends that are one
 
 @dataclass(frozen=True)
 class Places:
-    """Coordinates of the one free driver at which a force jumps or bends, the period after which they come again, and
-    the coordinates between which the nominal cycle knows the assembly.
+    """Coordinates of the one free driver at which a force jumps or bends, and the period after which they come again.
 
-    meetings: coordinates at which two assemblies of a module meet and the motion ends, with its number; they are among
-    the bends.
+    limits: coordinates between which free drivers may move, by name; meetings: coordinates at which two assemblies of a
+    module meet and the motion ends, with its number; they are among the bends.
     """
 
     bends: tuple[float, ...] = ()
     period: float | None = None
-    limits: tuple[float, float] = (-np.inf, np.inf)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     meetings: tuple[tuple[float, int], ...] = ()
 
 
@@ -46,18 +45,6 @@ def initial_row(motion: FreeMotion) -> Array:
         row[i] = single(values.get(f"{path}.initial.coordinate", begin))
         row[layout.coordinates + i] = single(values.get(f"{path}.initial.speed", 0.0))
     return row
-
-
-def ranges(motion: FreeMotion, drivers: Iterable[str], load_places: Places) -> dict[str, tuple[float, float]]:
-    """The coordinates between which free drivers may move, of those that have a range."""
-    if len(motion.system.mechanism.drivers) == 1:
-        return {motion.names[0]: load_places.limits}
-    ranges_stated = {}
-    for name in drivers:
-        ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
-        if name in motion.names and None not in ends:
-            ranges_stated[name] = min(map(single, ends)), max(map(single, ends))
-    return ranges_stated
 
 
 def load_times(motion: FreeMotion, duration: float) -> list[float]:
@@ -85,10 +72,16 @@ def load_times(motion: FreeMotion, duration: float) -> list[float]:
     return instants
 
 
-def places(motion: FreeMotion) -> Places:
-    """Of one free driver that alone moves the mechanism; of several, none are known beforehand."""
+def places(motion: FreeMotion, drivers: Collection[str] | None = None) -> Places:
+    """Of one free driver that alone moves the mechanism; of several, ranges alone are known beforehand. drivers: those
+    whose ranges count, all if not given."""
     if len(motion.system.mechanism.drivers) != 1:
-        return Places()
+        limits = {}
+        for name in motion.names:
+            ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
+            if None not in ends and (drivers is None or name in drivers):
+                limits[name] = min(map(single, ends)), max(map(single, ends))
+        return Places(limits=limits)
     run, cycle, (name,) = motion.run, motion.cycle, motion.names
     nominal = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(run.values, name))
     begin, speed = single(nominal.value), single(nominal.rate)
@@ -103,10 +96,10 @@ def places(motion: FreeMotion) -> Places:
     times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
     coordinates, span = begin + speed * np.append(times, [time for time, _ in meetings]), abs(speed) * cycle.duration
     if cycle.periodic:
-        return Places(_apart(np.mod(coordinates, span), span), span, meetings=met)
+        return Places(_apart(np.mod(coordinates, span), span), span, {name: (-np.inf, np.inf)}, met)
     low, high = sorted((begin, begin + speed * cycle.duration))
     inside = coordinates[(coordinates > low) & (coordinates < high)]
-    return Places(_apart(inside, span), None, (low, high), met)
+    return Places(_apart(inside, span), None, {name: (low, high)}, met)
 
 
 def _apart(coordinates: Array, span: float) -> tuple[float, ...]:

@@ -117,6 +117,11 @@ class Contact(ABC):
         """Second derivative of the gap, and derivative of the slip, m/s²."""
 
     @property
+    def rigid(self) -> bool:
+        """Whether it is one of bodies that do not give."""
+        return self.stiffness == 0.0
+
+    @property
     def surface(self) -> str:
         """The wall it touches."""
         return self.label

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
-from trunnion.dynamics.rates import Layout, Rates, Seen, Walks, bristle_rates, works_of
+from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, bristle_rates, works_of
 from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
@@ -67,6 +67,7 @@ class CompiledRates:
         self.walks = Walks(motion)
         self.layout = Layout.of(motion)
         self._works = 2 * self.layout.coordinates + self.layout.bristles  # where they begin
+        self._last = self._works + len(WORKS) + self.layout.touching  # of what is integrated
         self._programs: dict[tuple[Any, ...], Program | None] = {}
 
     def __call__(self, at: Moment) -> Rates:
@@ -75,7 +76,7 @@ class CompiledRates:
             state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
             numbers = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
             if numbers[-1] == 0.0 and math.isfinite(numbers.sum()):
-                n, memory, rates = self.layout.coordinates, self._works, numbers[:-1].copy()
+                n, memory, rates = self.layout.coordinates, self._works, numbers[: self._last].copy()
                 return Rates(rates[:n], rates[n : 2 * n], rates[2 * n : memory], rates[memory:], True)
         return self.walks(at)
 
@@ -91,10 +92,11 @@ class CompiledRates:
 
     def look(self, at: Moment) -> Seen:
         """See `rates.Dynamics`."""
-        numbers = self._numbers("look", at)
+        closed = any(isinstance(onset, Closed) for onset in at.onsets)
+        numbers = self._numbers("rates" if closed else "look", at)
         if numbers is None:
             return self.walks.look(at)
-        return Seen(*numbers.reshape(len(Seen._fields), -1, at.q.shape[1]))
+        return Seen(*numbers[self._last if closed else 0 :].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
     def _numbers(self, what: str, at: Moment) -> Array | None:
         """The numbers of a program, (number, lane); None where there is any doubt."""
@@ -107,7 +109,7 @@ class CompiledRates:
         something cannot be recorded."""
         touching = tuple(onset if isinstance(onset, Closed) else onset is not None for onset in at.onsets)
         closed = any(isinstance(onset, Closed) for onset in at.onsets)
-        senses = at.senses if what == "rates" or closed else ()
+        senses = at.senses if what == "rates" else ()
         if 0 in senses or (closed and not self.motion.affine):
             return None
         switches = tuple(drive.switches(at.now) for drive in self.motion.drives.values())
@@ -241,25 +243,21 @@ def _recorded(motion: FreeMotion, values: dict[str, Any], switches: Sequence[tup
 
 
 def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
-    """Accelerations, rates of the controllers' integrals and of deflections, works, as `rates.Walks` has them; 1 where
-    there is doubt."""
-    second, at, doubt = _solved(motion, at)
+    """Accelerations, rates of the controllers' integrals and of deflections, works, as `rates.Walks` has them, where
+    contacts of rigid bodies are closed also what `rates.Seen` has; 1 where there is doubt."""
+    second, at, doubt = _affine(motion, at) if motion.affine else _by_rounds(motion, at)
     back = motion.solve(at, cast("Any", second), sliding=True)
     for settled in back.settled:
         doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
     drives: Any = enumerate(motion.drives.values())
     errors = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
-    return [*second, *errors, *bristle_rates(motion, at, back), *works_of(back, at, motion.contacts), doubt]
-
-
-def _solved(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
-    """Accelerations, the moment with the forces of closed contacts, and 1 where there is doubt."""
-    return _affine(motion, at) if motion.affine else _by_rounds(motion, at)
+    seen = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
+    return [*second, *errors, *bristle_rates(motion, at, back), *works_of(back, at, motion.contacts), *seen, doubt]
 
 
 def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
-    """Accelerations by Newton's method with slopes by differences, and 1 where it did not end, or where more
-    acceleration takes less effort."""
+    """Accelerations by Newton's method with slopes by differences, the moment, and 1 where it did not end, or where
+    more acceleration takes less effort."""
     count, unit = len(motion.names), motion.trial
 
     def step(numbers: list[Number]) -> list[Number]:
@@ -286,7 +284,8 @@ def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Nu
 
 
 def _affine(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
-    """See `_solved`, where efforts are affine in the accelerations.
+    """Accelerations where efforts are affine in them, the moment with the forces of closed contacts, and 1 where there
+    is doubt.
 
     The columns of M are told from rest and without contacts, whose forces would leave no digits to the differences.
     """
@@ -328,12 +327,9 @@ def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) ->
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     """What `rates.Seen` has, of every contact."""
     nothing: Any = [0.0] * len(motion.names)
-    closed, doubt = any(isinstance(onset, Closed) for onset in at.onsets), cast("Number", 0.0)
-    if closed:
-        _, at, doubt = _solved(motion, at)
     pushes = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
     parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
-    return [*(part[i] for i in range(len(Seen._fields)) for part in parts), doubt]
+    return [*(part[i] for i in range(len(Seen._fields)) for part in parts), 0.0]
 
 
 def _margins(motion: FreeMotion, at: Moment) -> list[Number]:

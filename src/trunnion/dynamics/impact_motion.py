@@ -249,24 +249,16 @@ class ImpactMotion(ActiveMotion):
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
         """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
         the nearest state in the sense of the masses."""
-        n, closed = self.layout.coordinates, self._closed()
-        at = self.moment(time, row, 0.0, 0.0)
-        for _ in range(2):
-            linear = self.motion.linear(at)
-            shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
-            if not shut:
-                return
-            row[:n] -= nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
-            at = self.moment(time, row, 0.0, 0.0)
-        if not closed:
-            return
-        if stuck := [k for k, sense in enumerate(self.senses) if sense == 0]:
-            row[n : 2 * n] = self.motion.stopped(at, stuck)
-            return
+        n, closed, at = self.layout.coordinates, self._closed(), self.moment(time, row, 0.0, 0.0)
         linear = self.motion.linear(at)
-        sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
-        ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
-        row[n : 2 * n] -= nearest(linear.mass, ways, rates[[*closed, *sticks]])
+        if shut := [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]:
+            row[:n] -= nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
+        if closed and (stuck := [k for k, sense in enumerate(self.senses) if sense == 0]):
+            row[n : 2 * n] = self.motion.stopped(self.moment(time, row, 0.0, 0.0), stuck)
+        elif closed:
+            still = [*closed, *(self.count + k for k in closed if self.onsets[k] == Closed(0))]
+            rates = linear.driven + linear.ways @ row[n : 2 * n]
+            row[n : 2 * n] -= nearest(linear.mass, linear.ways[still], rates[still])
 
     def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""

@@ -54,7 +54,7 @@ class Books(NamedTuple):
     energies: Array
     works: Array
     resting: NDArray[np.bool_]
-    touches: Touches | None = None
+    touches: Touches
     sticking: NDArray[np.bool_] | None = None
 
 

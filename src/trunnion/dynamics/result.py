@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -159,51 +159,52 @@ class Found(NamedTuple):
         return self.course.worst / self.course.turned_over if self.course.turned_over > 0 else 0.0
 
 
-def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: Run | None = None) -> Result:
-    """The result of a motion in time. nominal: the mechanism as it was stated, where joints in play were taken out."""
-    solution, books = integrated.solution, integrated.books
-    run = nominal or motion.run
-    _note_switches(motion, solution)
+def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) -> Result:
+    """The result of a motion in time. run: of the mechanism as it was stated, its joints in play included."""
+    solution, books, contacts = integrated.solution, integrated.books, motion.contacts.each
     mechanism, system = run.system.mechanism, run.system
+    for time, kind, of, effort in switched(motion.drives, solution.end):
+        unit = "" if np.isnan(effort) else "N m" if motion.system.turns(of) else "N"
+        solution.events.append(Event(time, kind, of, effort, unit))
+    solution.events.sort(key=lambda event: event.time)
     scales = integrated.course.scales if integrated.course else largest(run, books.arrays)
-    findings = [
-        *motion_findings(motion, solution, run),
-        *_unbalanced(integrated),
-        *undefined(books.time, books.arrays["status"]),
-    ]
-    attributes = encoded(
-        {
-            **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
-            **cited(references(mechanism)),
-            "free_drivers": stated_drivers(motion, run),
-            "duration": duration,
-            "findings": finding_rows(findings),
-            **(_named_contacts(motion, solution) if nominal else {}),
-            **scales.summary(_summary(motion, integrated, run, scales)),
-            "inputs": inputs(mechanism),
-            "scene": scene_of(run),
-            "events": [[event.kind, event.of, event.figure if np.isfinite(event.figure) else None, event.unit]
-                       for event in solution.events],
-        }
-    )  # fmt: skip
+    findings = [*motion_findings(motion, solution, run), *undefined(books.time, books.arrays["status"])]
+    if integrated.share > WORST:
+        what = f"works and energies differ by {integrated.share:.2g} of the energy turned over"
+        remedy = "ask for a smaller --tolerance"
+        findings.append(Finding.warning("simulate.energy", "", what, remedy, share=integrated.share))
+    labelled = {
+        "impacts": [impact.label for impact in solution.impacts],
+        "contact_pins": [contact.label for contact in contacts if contact.bored],
+    }
+    attributes = encoded({
+        **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
+        **cited(references(mechanism)),
+        "free_drivers": stated_drivers(motion, run),
+        "duration": duration,
+        "findings": finding_rows(findings),
+        **(labelled if contacts else {}),
+        **scales.summary(_summary(motion, integrated, run, scales)),
+        "inputs": inputs(mechanism),
+        "scene": scene_of(run),
+        "events": [[event.kind, event.of, event.figure if np.isfinite(event.figure) else None, event.unit]
+                   for event in solution.events],
+    })  # fmt: skip
 
     def build() -> xr.Dataset:
-        variables = {name: event.over("time") for name, event in results.variables(mechanism.space).items()}
-        units = member_units(system)
+        variables = {name: variable.over("time") for name, variable in results.variables(mechanism.space).items()}
+        units, labels = member_units(system), dict(books.labels)
         parts = described(books.arrays, variables, units)
-        parts |= described(_own(motion, run, solution, books), MOTION, units)
-        labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
-        coordinates = {"time": books.time}
-        if nominal is not None and books.touches is not None:
+        parts |= described(_beside(motion, run, solution, books), MOTION, units)
+        along, coordinates = {"time": Variable(("time",), "s", "time from the start")}, {"time": books.time}
+        if contacts:
             labels["contact"] = list(motion.contacts.labels)
-            parts |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
-                impact_arrays(solution.impacts), IMPACT
-            )
+            parts |= described(books.touches.arrays(books.works[-1]), CONTACT)
+            parts |= described(impact_arrays(solution.impacts), IMPACT)
             rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
             rows = rows if solution.ended is None else rows[:-1]  # the end is not evenly spaced
-            if len(rows) >= FEWEST and not any(
-                contact.rigid for contact in motion.contacts.each
-            ):  # an impact of rigid bodies has no force
+            rigid = any(contact.rigid for contact in contacts)  # their impacts have no force
+            if len(rows) >= FEWEST and not rigid:
                 along["frequency"] = FREQUENCY
                 coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
                 parts |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
@@ -212,29 +213,26 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: R
     return Result(attributes, build)
 
 
-def _named_contacts(motion: FreeMotion, solution: Solution) -> dict[str, list[str]]:
-    """The contact of every impact, and the contacts that are pins in holes."""
-    pins = [contact.label for contact in motion.contacts.each if contact.bored]
-    return {"impacts": [contact.label for contact in solution.impacts], "contact_pins": pins}
-
-
-def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> dict[str, Any]:
+def _beside(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> dict[str, Any]:
     """What there is beside the variables of a cycle."""
-    system, names = run.system, list(run.system.mechanism.drivers)
-    coordinates, rates = np.empty((2, len(names), len(books.time)))
+    names = list(run.system.mechanism.drivers)
+    coordinates, rates, rotors = np.full((3, len(names), len(books.time)), np.nan)
     for row, name in enumerate(names):
         if name in motion.names:
-            i = motion.names.index(name)
+            i, drive = motion.names.index(name), motion.drives[name]
             coordinates[row], rates[row] = books.at.q[i], books.at.rate[i]
+            if drive.clutched:
+                rotors[row] = books.at.slip[0] + drive.ratio * books.at.rate[i]
         else:
             over = ~np.isfinite(books.works[0])  # there is no motion any more
-            moved = system.drive(motion.values, name, books.time)[:2]
+            moved = run.system.drive(motion.values, name, books.time)[:2]
             coordinates[row], rates[row] = (np.where(over, np.nan, part) for part in moved)
+    works = zip(solution.layout.works_named, books.works, strict=True)
     return {
         "drive_coordinate": coordinates,
         "drive_rate": rates,
-        **{f"work_{name}": work for name, work in _works(solution, books.works).items() if name != IN_CONTACTS},
-        **_rotors(motion, names, books),
+        **{f"work_{name}": work for name, work in works if name != IN_CONTACTS},
+        **({"rotor_speed": rotors} if len(books.at.slip) else {}),
         "kinetic_energy": books.energies[0],
         "potential_energy": books.energies[1],
         "energy_residual": _residual(books.works, books.energies),
@@ -242,28 +240,6 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> dict
         **({} if books.sticking is None else {"sticking": books.sticking}),
         "event_time": np.array([event.time for event in solution.events], float),
     }
-
-
-def _works(solution: Solution, works: Array) -> dict[str, Array]:
-    """Works by their names."""
-    return dict(zip(solution.layout.works_named, works, strict=True))
-
-
-def _rotors(motion: FreeMotion, names: Sequence[str], books: Books) -> dict[str, Array]:
-    """Speeds of the rotors behind clutches, (driver, time), where there are any."""
-    coordinates = np.full((len(names), len(books.time)), np.nan)
-    for i, (name, drive) in enumerate(motion.drives.items()):
-        if drive.clutched:
-            coordinates[names.index(name)] = books.at.slip[0] + drive.ratio * books.at.rate[i]
-    return {"rotor_speed": coordinates} if len(books.at.slip) else {}
-
-
-def _note_switches(motion: FreeMotion, solution: Solution) -> None:
-    """Add the motors that are switched off and the brakes that are put on to the events, in their order."""
-    for time, kind, of, effort in switched(motion.drives, solution.end):
-        unit = "" if np.isnan(effort) else "N m" if motion.system.turns(of) else "N"
-        solution.events.append(Event(time, kind, of, effort, unit))
-    solution.events.sort(key=lambda event: event.time)
 
 
 # ---- energy ---------------------------------------------------------------------------------------------------
@@ -286,13 +262,6 @@ ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
-def _unbalanced(integrated: Found) -> Iterator[Finding]:
-    if integrated.share > WORST:
-        what = f"works and energies differ by {integrated.share:.2g} of the energy turned over"
-        remedy = "ask for a smaller --tolerance"
-        yield Finding.warning("simulate.energy", "", what, remedy, share=integrated.share)
-
-
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
@@ -305,31 +274,26 @@ def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) ->
     for i, name in enumerate(stated_drivers(motion, run)):
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
         unit, speed = "rad/s" if turns else "m/s", f"speed of {name}"
-        figures.append(_largest(f"{name}.speed_max", speed, unit, *course.farthest(i)))
-        last = float(course.last.at.rate[i, 0])
-        figures.append(Figure(f"{name}.speed_end", speed, last, unit, "at the end", _at(solution.end)))
-        peak, noun = course.farthest(course.counts[0] + names.index(name)), "drive torque" if turns else "drive force"
+        value, time = course.farthest(i)
+        figures.append(Figure(f"{name}.speed_max", speed, value, unit, "largest", f"at {time:.4g} s"))
+        last, end = float(course.last.at.rate[i, 0]), f"at {solution.end:.4g} s"
+        figures.append(Figure(f"{name}.speed_end", speed, last, unit, "at the end", end))
+        value, time = course.farthest(course.counts[0] + names.index(name))
         # of others it is rounding; where nothing has inertia at a dead centre there is none
-        if motion.system.mechanism.drivers[name].motor is not None and np.isfinite(peak[0]):
-            figures.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, *peak))
+        if motion.system.mechanism.drivers[name].motor is not None and np.isfinite(value):
+            subject, when = f"drive {'torque' if turns else 'force'} of {name}", f"at {time:.4g} s"
+            figures.append(Figure(f"{name}.effort_max", subject, value, effort, "largest", when))
         figures += steady_figures(motion, solution, i)
     ended = solution.ended is not None and solution.ended.code == "simulate.change_point"
     if not ended and not any(event.kind == "change-point" for event in solution.events):  # there they have no bound
         for i, joint in enumerate(run.system.joints):
-            if (peak := course.reaction(i))[0] > 0:
-                figures.append(_largest(f"{joint}.reaction_max", f"reaction in {joint}", "N", *peak))
+            value, time = course.reaction(i)
+            if value > 0:
+                subject, when = f"reaction in {joint}", f"at {time:.4g} s"
+                figures.append(Figure(f"{joint}.reaction_max", subject, value, "N", "largest", when))
     figures += impact_figures(motion.contacts.labels, solution.impacts, solution.end)
-    for key, work in _works(solution, course.last.works).items():
+    for key, work in zip(solution.layout.works_named, course.last.works, strict=True):
         if abs(work[0]) > scales.floor("J"):
             figures.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))
     figures.append(Figure("energy_residual", "largest error of the energy account", course.worst, "J"))
     return figures
-
-
-def _largest(name: str, subject: str, unit: str, value: float, time: float) -> Figure:
-    """What is farthest from 0, with its time, s."""
-    return Figure(name, subject, value, unit, "largest", _at(time))
-
-
-def _at(time: float) -> str:
-    return f"at {time:.4g} s"

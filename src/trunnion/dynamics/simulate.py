@@ -129,7 +129,7 @@ def simulated(
         solution = integration.run(row.copy())
         return Found.of(run, solution, time, lambda when: Filling(motion, solution, when, bare).books())
 
-    return result_of(motion, _balanced(found, tolerance), duration, run if playing else None)
+    return result_of(motion, _balanced(found, tolerance), duration, run)
 
 
 def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.dynamics.checks import check_start, refuse, refuse_undetermined
 from trunnion.dynamics.compiled_rates import Codes, CompiledRates, rates_of
-from trunnion.dynamics.filling import Books, Filling
+from trunnion.dynamics.filling import Books, filled
 from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.integrate import Integration
@@ -121,4 +121,4 @@ class Continued:
     @np.errstate(all="ignore")
     def _books(self, solution: Solution, time: float) -> Books:
         """Every variable at a time, s."""
-        return Filling(self.motion, solution, np.array([time])).books()
+        return filled(self.motion, solution, np.array([time]))

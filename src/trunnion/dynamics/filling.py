@@ -6,8 +6,9 @@ stands in for them; beside it stands what contacts and impacts come to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from trunnion.dynamics.rates import kinetic_energy, potential_energy
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import Impact, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
+from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.errors import Status
 from trunnion.results.dataset import Variable
 from trunnion.results.figure import Figure
@@ -34,7 +35,7 @@ from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.memory import CHUNK
 
 __all__ = [
-    "CONTACT", "FEWEST", "FREQUENCY", "IMPACT", "SPECTRUM", "Filling", "Stated", "Touches", "impact_arrays",
+    "CONTACT", "FEWEST", "FREQUENCY", "IMPACT", "SPECTRUM", "Books", "Stated", "Touches", "filled", "impact_arrays",
     "impact_figures", "spectrum",
 ]  # fmt: skip
 
@@ -58,93 +59,65 @@ class Books(NamedTuple):
     sticking: NDArray[np.bool_] | None = None
 
 
-@dataclass(frozen=True)
-class Filling:
-    """The variables of a result at the times of its rows, from the state by walks, as `analyse` has them."""
+def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened | None = None) -> Books:
+    """Every variable over rows up to where a motion ends, by walks, as `analyse` has them; NaN after it.
 
-    motion: FreeMotion
-    solution: Solution
-    time: Array
-    stated: Opened | None = None
-
-    def books(self) -> Books:
-        """Every variable, over the rows up to where the motion ends; NaN after it."""
-        motion, stated = self.motion, None if self.stated is None else Stated(self.stated, self.motion.contacts)
-        system = (motion.run if stated is None else stated.run).system
-        labels = fill.labels(system)
-        arrays = fill.allocate(system, len(self.time))
-        rows, which = self.solution.at(self.time)
-        layout = self.solution.layout
-        seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
-        touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(self.time))
-        arrays["status"][...] = Status.NOT_CONVERGED
-        for lanes, stretch in self._alike(which):
-            at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now, stretch.slips)
-            at = at._replace(onsets=stretch.onsets, senses=stretch.senses)
-            second, back, onsets = self._solved(at, stretch)
-            seconds[:, lanes] = second
-            window = slice(int(lanes[0]), int(lanes[-1]) + 1)
-            energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
-            touched = motion.contacts.pushes(back.walk, onsets)
-            touches.fill(lanes, touched, onsets)
-            shown = back if stated is None else stated.back(back, touched)
-            fill_chunk(arrays, shown, at.time, window)
-            if stated is not None:
-                stated.fill(arrays, shown.walk, touched, window)
-        moments = layout.moment(self.time, rows)
-        for array in arrays.values():  # there is no motion any more
-            if array.dtype == np.float64:
-                array[..., which < 0] = np.nan
-        fill.unwrap(arrays, system, motion.values_at(moments, np.nan_to_num(seconds)), self.time)
-        resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
+    time: s, of the rows, rising; opened: where joints in play were taken out, so that the rows are of those stated.
+    """
+    stated, layout = None if opened is None else Stated(opened, motion.contacts), solution.layout
+    system = (motion.run if stated is None else stated.run).system
+    arrays, (rows, which) = fill.allocate(system, len(time)), solution.at(time)
+    seconds, energies = np.full((layout.coordinates, len(time)), np.nan), np.full((2, len(time)), np.nan)
+    touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(time))
+    sticking = np.zeros((len(system.joints), len(time)), bool)
+    resting = np.zeros(len(time), bool)
+    arrays["status"][...] = Status.NOT_CONVERGED
+    for lanes, stretch in _alike(solution, which):
+        at = layout.moment(time[lanes], rows[:, lanes], stretch.sense, stretch.now, stretch.slips)
+        at, onsets = at._replace(onsets=stretch.onsets, senses=stretch.senses), stretch.onsets
+        motion.begin(stretch.snapshot)
+        if stretch.resting and not motion.resisted:  # with the shares of the friction that hold it
+            seconds[:, lanes], back = 0.0, Rest(motion, layout, stretch.slips).back(at)
+        else:
+            accelerated = motion.accelerate(at)
+            seconds[:, lanes], back, onsets = accelerated.second, accelerated.back, accelerated.onsets
+        window = slice(int(lanes[0]), int(lanes[-1]) + 1)
+        energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
+        touched = motion.contacts.pushes(back.walk, onsets)
+        touches.fill(lanes, touched, onsets)
+        stated_back = back if stated is None else stated.back(back, touched)
+        fill_chunk(arrays, stated_back, at.time, window)
         if stated is not None:
-            energies = np.vstack([energies, touches.stored.sum(axis=0)])
-        works, sticking = layout.works(rows), self._sticking(which)
-        return Books(self.time, arrays, labels, moments, seconds, energies, works, resting, touches, sticking)
+            stated.fill(arrays, stated_back.walk, touched, window)
+        resting[lanes] = stretch.resting
+        for name, sense in zip(motion.resisted, stretch.senses, strict=False):
+            sticking[list(system.joints).index(name), lanes] = sense == 0
+    for array in arrays.values():  # there is no motion any more
+        if array.dtype == np.float64:
+            array[..., which < 0] = np.nan
+    moments = layout.moment(time, rows)
+    fill.unwrap(arrays, system, motion.values_at(moments, np.nan_to_num(seconds)), time)
+    if stated is not None:
+        energies = np.vstack([energies, touches.stored.sum(axis=0)])
+    one_by_one = sticking if motion.resisted else None
+    labels, works = fill.labels(system), layout.works(rows)
+    return Books(time, arrays, labels, moments, seconds, energies, works, resting, touches, one_by_one)
 
-    def _sticking(self, which: NDArray[np.intp]) -> NDArray[np.bool_] | None:
-        """Which joints stick, (joint, row), where they do one by one; of joints in play none does."""
-        if not self.motion.resisted:
-            return None
-        joints = list((self.stated.run if self.stated else self.motion.run).system.joints)
-        sticks = np.zeros((len(joints), len(which)), bool)
-        for i, name in enumerate(self.motion.resisted):
-            sticks[joints.index(name)] = [k >= 0 and self.solution.stretches[k].senses[i] == 0 for k in which]
-        return sticks
 
-    def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
-        """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
-        groups: list[tuple[NDArray[np.intp], Stretch]] = []
-        stretches = self.solution.stretches
+def _alike(solution: Solution, which: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Stretch]]:
+    """Runs of rows that one walk can solve: of the same sense, switches and assembly. which: stretch of every row."""
 
-        def key(k: int) -> object:
-            stretch = stretches[k]
-            snapshot = None if stretch.snapshot is None else id(stretch.snapshot)
-            return stretch.sense, stretch.resting, stretch.now, stretch.onsets, stretch.senses, stretch.slips, snapshot
+    def key(row: Any) -> object:
+        stretch = solution.stretches[which[row]]
+        return *stretch[3:6], id(stretch.snapshot), *stretch[7:]
 
-        begin = 0
-        for i in range(1, len(which) + 1):
-            same = i < len(which) and i - begin < CHUNK and which[i] >= 0 and key(which[i]) == key(which[begin])
-            if which[begin] >= 0 and not same:
-                groups.append((np.arange(begin, i), stretches[which[begin]]))
-            if not same:
-                begin = i
-            if begin < len(which) and which[begin] < 0:
-                break
-        return groups
-
-    def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
-        """Accelerations and the walk; at rest with the shares of the friction that hold it."""
-        self.motion.begin(stretch.snapshot)
-        if not stretch.resting or self.motion.resisted:
-            accelerated = self.motion.accelerate(at)
-            return accelerated.second, accelerated.back, accelerated.onsets
-        rest = Rest(self.motion, self.solution.layout, stretch.slips)
-        return np.zeros_like(at.q), rest.back(at), ()
+    for _, rows in itertools.groupby(np.flatnonzero(which >= 0), key):
+        lanes = np.array(list(rows))
+        for part in np.split(lanes, range(CHUNK, len(lanes), CHUNK)):
+            yield part, solution.stretches[which[part[0]]]
 
 
 Touched = Sequence[tuple[ContactState, Push]]
-
 CONTACT: dict[str, Variable] = {
     "contact_gap": Variable(("contact", "time"), "m", "gap of the contact, negative where it touches"),
     "contact_normal_force": Variable(("contact", "time"), "N", "normal force of the contact"),
@@ -286,30 +259,22 @@ def impact_figures(labels: Sequence[str], impacts: Sequence[Impact], end: float)
         if not of_contact:
             continue
         long = sum((impact.end if np.isfinite(impact.end) else end) - impact.begin for impact in of_contact)
-        share = long / end if end else np.nan
-        depth, speed = max(impact.depth for impact in of_contact), max(impact.approach for impact in of_contact)
-        struck, pushed = (
-            [impact for impact in of_contact if np.isnan(impact.force)],
-            [impact for impact in of_contact if np.isfinite(impact.force)],
-        )
-        if struck:  # an impact of rigid bodies has no largest force
+        if struck := [impact for impact in of_contact if np.isnan(impact.force)]:  # of rigid bodies: without a force
             hardest = max(struck, key=lambda impact: impact.impulse)
-            when = f"at {hardest.begin:.4g} s"
-            figures.append(
-                Figure(f"{label}.impulse_max", f"impulse in {label}", hardest.impulse, "N s", "largest", when)
-            )
-        if pushed:
+            subject, when = f"impulse in {label}", f"at {hardest.begin:.4g} s"
+            figures.append(Figure(f"{label}.impulse_max", subject, hardest.impulse, "N s", "largest", when))
+        if pushed := [impact for impact in of_contact if np.isfinite(impact.force)]:
             most = max(pushed, key=lambda impact: impact.force)
-            when = f"in the contact from {most.begin:.4g} s"
-            figures.append(
-                Figure(f"{label}.contact_force_max", f"contact force in {label}", most.force, "N", "largest", when)
-            )
-        if depth > 0:
+            subject, when = f"contact force in {label}", f"in the contact from {most.begin:.4g} s"
+            figures.append(Figure(f"{label}.contact_force_max", subject, most.force, "N", "largest", when))
+        if (depth := max(impact.depth for impact in of_contact)) > 0:
             figures.append(Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"))
+        speed, wear = max(impact.approach for impact in of_contact), sum(impact.wear for impact in of_contact)
+        share = long / end if end else np.nan
         figures += [
             Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest"),
             Figure(f"{label}.contact_time", f"time in contact of {label}", share, "1", "of all"),
-            Figure(f"{label}.wear", f"wear index of {label}", sum(impact.wear for impact in of_contact), "J"),
+            Figure(f"{label}.wear", f"wear index of {label}", wear, "J"),
         ]
     return figures
 

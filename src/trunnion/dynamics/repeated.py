@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.filling import filled
 from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.state import FreeMotion
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
@@ -42,7 +42,7 @@ class Repeated:
         """Those of the free coordinates, over a solution that ends as it begins but for whole turns."""
         begins = np.array([stretch.begin for stretch in solution.stretches] + [solution.end])
         time = 0.5 * (begins[1:] + begins[:-1])[:, None] + 0.5 * np.diff(begins)[:, None] * NODES
-        books = Filling(motion, solution, time.ravel()).books()
+        books = filled(motion, solution, time.ravel())
         ends, _ = solution.at(np.array([0.0, solution.end]))
         numbers = np.array([books.at.q, books.at.rate, books.seconds]).reshape(3, -1, *time.shape) @ COEFFICIENTS.T
         return [cls(begins, numbers[:, i], float(ends[i, 1] - ends[i, 0])) for i in range(len(motion.names))]

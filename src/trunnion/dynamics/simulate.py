@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.dynamics.checks import check_start, refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_rates import rates_of
-from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.filling import filled
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
@@ -127,7 +127,7 @@ def simulated(
         motion.begin(None)
         integration = integration_of(motion, rates, load_places, duration, tolerance, progress, evaluations)
         solution = integration.run(row.copy())
-        return Found.of(run, solution, time, lambda when: Filling(motion, solution, when, bare).books())
+        return Found.of(run, solution, time, lambda when: filled(motion, solution, when, bare))
 
     return result_of(motion, _balanced(found, tolerance), duration, run)
 

@@ -20,7 +20,7 @@ from trunnion.algebra.dual import single
 from trunnion.cycle import summary
 from trunnion.cycle.positions import Positions, positions
 from trunnion.dynamics.compiled_rates import rates_of
-from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.filling import filled
 from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
@@ -308,7 +308,7 @@ def _missing(motion: FreeMotion, cycle: SteadyCycle, at: Positions) -> float:
 
     Where a joint is at rest for a moment its friction may act either way: such positions tell nothing.
     """
-    efforts = Filling(motion, cycle.solution, at.time).books().arrays["drive_effort"]
+    efforts = filled(motion, cycle.solution, at.time).arrays["drive_effort"]
     differences = np.abs(at.arrays["drive_effort"] - efforts)[:, at.arrays["status"] == Status.SOLVED]
     return float(np.nanmax(differences, initial=0.0)) / max(float(np.max(np.abs(efforts))), 1e-300)
 

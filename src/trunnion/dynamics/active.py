@@ -100,17 +100,14 @@ class ActiveSet:
         brink = crossed is not None and bool(before) and before[crossed] == 0
         case = self._consistent(at, base, may, brink)
         if case is not None and (idle := [k for k in slow if k not in may and k != crossed]):
-            ahead = self._ahead(case)
+            # relative speeds of all joints a little later, as the accelerations have it
+            second, soon = self.motion.accelerate(case).second, SOON / self.pace
+            rate = case.rate + second * soon
+            later = case._replace(q=case.q + 0.5 * (case.rate + rate) * soon, rate=rate)
+            ahead = self.motion.speeds(self.motion.walk(later, second), 1)[:, 0]
             base = [int(np.sign(ahead[k])) or 1 if k in idle else sense for k, sense in enumerate(base)]
             case = self._consistent(at, base, may, brink)
         return Case(None if case is None else case.senses, at.onsets if case is None else case.onsets, may, tuple(base))
-
-    def _ahead(self, at: Moment) -> Array:
-        """Relative speeds of all joints a little later, as the accelerations have it."""
-        second, soon = self.motion.accelerate(at).second, SOON / self.pace
-        rate = at.rate + second * soon
-        walk = self.motion.walk(at._replace(q=at.q + 0.5 * (at.rate + rate) * soon, rate=rate), second)
-        return self.motion.speeds(walk, 1)[:, 0]
 
     def _consistent(self, at: Moment, base: Sequence[int], may: Sequence[int], brink: bool) -> Moment | None:
         """The moment with the senses of all joints and the contacts that agree with forces and accelerations; None: no

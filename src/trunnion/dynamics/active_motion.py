@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Senses
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
-from trunnion.dynamics.integrate import AHEAD, Integration
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seen
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
 from trunnion.dynamics.state import Moment
@@ -197,22 +197,12 @@ class ActiveMotion(Integration):
         self.senses = locked.senses
         return True
 
-    def _failed(
-        self, time: float, row: Array, sense: float, now: float, message: str | None
-    ) -> tuple[float, Array, None]:
-        """As of any motion; where there are no accelerations ahead, joints lock."""
+    def _locked(self, time: float, row: Array, sense: float, now: float, causes: Sequence[str]) -> bool:
+        """As of any motion; where several coordinates are free, some joints lock."""
         if not self.motion.resisted:
-            return super()._failed(time, row, sense, now, message)
+            return super()._locked(time, row, sense, now, causes)
         with np.errstate(all="ignore"):
-            ahead = row.copy()
-            soon, at = AHEAD / float(np.max(self.pace)), self.moment(time, row, sense, now)
-            n, second = self.layout.coordinates, np.nan_to_num(self.motion.accelerate(at).second[:, 0])
-            ahead[:n] += soon * row[n : 2 * n]
-            ahead[n : 2 * n] += soon * second
-            causes = {self._cause(when, state, sense, now) for when, state in ((time, row), (time + soon, ahead))}
-            if causes & {"locked", "no_acceleration"} and self._jammed(time, row, self.senses):
-                return time, row, None
-        return super()._failed(time, row, sense, now, message)
+            return bool({"locked", "no_acceleration"} & set(causes)) and self._jammed(time, row, self.senses)
 
     def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
         """Whether all free coordinates rest from here on, in what resists the joints."""
@@ -243,27 +233,18 @@ class ActiveMotion(Integration):
             elastic = elastic_force(-touches.gap[k], contact.stiffness, contact.exponent)
             opening.impulse += float(weights @ normal)
             opening.loss += float(weights @ ((elastic - normal) * touches.rate[k]))
-            turns = np.flatnonzero(slip[1:] * slip[:-1] < 0.0)
-            if len(turns):
-                places = [self._turn(dense, k, times[i], times[i + 1]) for i in turns]
-                opening.wear += self._rubbed(dense, k, [begin, *places, end])
-            else:
-                opening.wear += float(weights @ np.abs(normal * slip))
+
+            def slip_at(time: float, k: int = k) -> float:
+                return float(self._look(dense, np.array([time])).slip[k, 0])
+
+            turns = [float(brentq(slip_at, *times[i : i + 2])) for i in np.flatnonzero(slip[1:] * slip[:-1] < 0.0)]
+            for low, high in pairwise([begin, *turns, end]) if turns else ():
+                parts, shares = step_nodes(low, high)
+                part = self._look(dense, parts)
+                opening.wear += float(shares @ np.abs(part.normal[k] * part.slip[k]))
+            opening.wear += 0.0 if turns else float(weights @ np.abs(normal * slip))
             opening.force = self._largest(dense, times, touches.normal[k], k, 1, opening.force)
             opening.depth = self._largest(dense, times, -touches.gap[k], k, -1, opening.depth)
-
-    def _turn(self, dense: Dense, k: int, low: float, high: float) -> float:
-        """When the slip of a contact turns round."""
-        return float(brentq(lambda time: float(self._look(dense, np.array([time])).slip[k, 0]), low, high))
-
-    def _rubbed(self, dense: Dense, k: int, ends: list[float]) -> float:
-        """Wear index of a contact, J, over parts of a step."""
-        work = 0.0
-        for begin, end in pairwise(ends):
-            times, weights = step_nodes(begin, end)
-            touches = self._look(dense, times)
-            work += float(weights @ np.abs(touches.normal[k] * touches.slip[k]))
-        return work
 
     def _largest(self, dense: Dense, times: Array, touches: Array, k: int, what: int, peak: float) -> float:
         """The largest normal force (what: 1) or penetration (−1) of a contact, from before and within a step: looked at

@@ -162,28 +162,29 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     if all(stretch.resting for stretch in solution.stretches):
         remedy = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
         yield Finding.warning(f"simulate.{codes[0]}", where, f"{subject} does not start: {acts}", remedy, **figures)
-    elif _on(motion, solution):
+    elif on := _on(motion, solution):
         turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
         place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
-        what = f"{subject} stalls at {since}, {motion.names[0]} at {readable(place, unit)}, with the motor on: {acts}"
+        what = f"{subject} stalls at {since}, {motion.names[0]} at {readable(place, unit)}, with the motor of "
+        what += f"{', '.join(on)} on: {acts}"
         remedy = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
-        yield Finding.error(
-            f"simulate.{codes[1]}", where, what, remedy, **figures, time=rests[-1], coordinate=place, place=unit
-        )
+        figures |= {"time": rests[-1], **({"drivers": on} if motion.resisted else {"coordinate": place, "place": unit})}
+        yield Finding.error(f"simulate.{codes[1]}", where, what, remedy, **figures)
     else:
         what = f"{subject} comes to rest {counted(len(rests), 'time')}, for the last time at {since}: {acts}"
         yield Finding.note(f"simulate.{codes[2]}", where, what, **figures, time=rests[-1], times=len(rests))
 
 
-def _on(motion: FreeMotion, solution: Solution) -> bool:
-    """Whether some motor still acts at the end, through its clutch if it has one, and is not braked."""
+def _on(motion: FreeMotion, solution: Solution) -> list[str]:
+    """The free drivers whose motor still acts at the end, through its clutch if it has one, and is not braked."""
     last, time = solution.stretches[-1], np.array([solution.end])
     at = solution.layout.moment(time, solution.at(time)[0], now=last.now)
-    return any(
-        not drive.braking(last.now)
+    return [
+        name
+        for i, (name, drive) in enumerate(motion.drives.items())
+        if not drive.braking(last.now)
         and np.any(drive.seen(last.now, last.slips).shaft(time, at.rate[i], at.integral[i], last.now) != 0.0)
-        for i, drive in enumerate(motion.drives.values())
-    )
+    ]
 
 
 def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[float, float]:

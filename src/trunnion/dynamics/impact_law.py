@@ -48,7 +48,9 @@ def strike(delassus: Array, before: Array, restitution: Array, friction: Array) 
     any the law always loses.
     """
     struck = _struck(delassus, before, restitution, friction)
-    if struck is None or struck.loss >= -CLOSE * _energy(struck, before):
+    if struck is None:
+        return None
+    if struck.loss >= -CLOSE * float(np.abs(struck.impulse) @ (np.abs(before) + np.abs(struck.after))):
         return struck
     low, high, best = 0.0, 1.0, None
     for _ in range(HALVINGS):
@@ -61,10 +63,6 @@ def strike(delassus: Array, before: Array, restitution: Array, friction: Array) 
         else:
             high = share
     return best
-
-
-def _energy(struck: Struck, before: Array) -> float:
-    return float(np.abs(struck.impulse) @ (np.abs(before) + np.abs(struck.after)))
 
 
 def _struck(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:

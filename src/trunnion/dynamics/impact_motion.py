@@ -89,7 +89,8 @@ class ImpactMotion(ActiveMotion):
             self._end(contact, time, 0.0)
             self._set({contact: None})
             return np.inf
-        together = [other for other in self._closed() if self._surface(other) == self._surface(contact)]
+        each = self.motion.contacts.each
+        together = [other for other in self._closed() if each[other].surface == each[contact].surface]
         if onset.sense:  # the slip ends
             self._set(dict.fromkeys(together, Closed(0)))
             self._project(time, row)
@@ -100,9 +101,6 @@ class ImpactMotion(ActiveMotion):
 
     def _closed(self) -> list[int]:
         return [k for k, onset in enumerate(self.onsets) if onset is not None]
-
-    def _surface(self, k: int) -> str:
-        return self.motion.contacts.each[k].surface
 
     def _set(self, onsets: Mapping[int, Closed | None]) -> None:
         self.onsets = tuple(onsets.get(k, onset) for k, onset in enumerate(self.onsets))
@@ -132,9 +130,15 @@ class ImpactMotion(ActiveMotion):
         struck, change = law
         if crowded:
             self.recent.clear()
-        if crowded or struck.kept < 1.0:
-            self._lowered(time, 0.0 if crowded else struck.kept)
-        self._strike_off(row, change, self._driven(at, change, struck, places, linear.driven), struck.loss)
+        if crowded or struck.kept < 1.0:  # an impact kept less than its restitution
+            first = {"times": 0, "time": time, "share": 1.0}
+            note = self.solution.notes.setdefault("simulate.restitution_lowered", first)
+            note["times"] += 1
+            note["share"] = min(note["share"], 0.0 if crowded else struck.kept)
+        n, works = self.layout.coordinates, self.layout.works(row)
+        row[n : 2 * n] += change
+        works[0] += self._driven(at, change, struck, places, linear.driven)
+        works[-1] += struck.loss
         self._after(time, row, places, rates, struck, pauses)
         return FLIGHT * min((pause for pause, low in flights.values() if not low), default=np.inf)
 
@@ -157,19 +161,6 @@ class ImpactMotion(ActiveMotion):
         put_in = sum(single((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)) for name in names)
         rows = [*places, *(self.count + k for k in places)]
         return put_in - float(struck.impulse @ driven[rows])
-
-    def _strike_off(self, row: Array, change: Array, drive: float, loss: float) -> None:
-        """Let an impact change a row: rates, and the works of drivers and contacts."""
-        n, works = self.layout.coordinates, self.layout.works(row)
-        row[n : 2 * n] += change
-        works[0] += drive
-        works[-1] += loss
-
-    def _lowered(self, time: float, energy_left: float) -> None:
-        """Take down that an impact kept less than its restitution."""
-        note = self.solution.notes.setdefault("simulate.restitution_lowered", {"times": 0, "time": time, "share": 1.0})
-        note["times"] += 1
-        note["share"] = min(note["share"], energy_left)
 
     def _flights(
         self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, change: Array

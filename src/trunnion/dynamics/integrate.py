@@ -286,7 +286,8 @@ class Integration:
             marks.append(before)
             if any(len(marks) > k and before - marks[-k] < crept * self.duration for k, crept in CREEPING):
                 return self._failed(before, row, sense, now, "")
-            near = self._near(row, between, self._next(solver, until), rate, before)
+            size = float(getattr(solver, "h_abs", None) or solver.step_size or 0.0)  # of the step that comes
+            near = self._near(row, between, min(size, until - before), rate, before)
             solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
                 return self._failed(before, row, sense, now, failed)
@@ -320,7 +321,8 @@ class Integration:
             speeds = numbers[n : 2 * n]
             numbers_asked = numbers.copy()
             if not one_way:
-                numbers_asked[:n] = self._in_range(numbers[:n])
+                if self.places.limits:  # no force may be known beyond
+                    numbers_asked[:n] = np.clip(numbers[:n], *self.ends)
             else:
                 numbers_asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
@@ -337,10 +339,6 @@ class Integration:
         if not np.isfinite(end):
             return 0.0
         return (INSIDE if self._meeting(end) is None else MEETING) * max(1.0, abs(end))
-
-    def _in_range(self, coordinates: Array) -> Array:
-        """Coordinates of which none is beyond its range, where no force may be known."""
-        return np.clip(coordinates, *self.ends) if self.places.limits else coordinates
 
     def _solver(
         self, rate: Callable[[float, Array], Array], begin: float, row: Array, end: float, absolute: Array,
@@ -363,11 +361,6 @@ class Integration:
             solver = self._solver(rate, begin, state, end, absolute, 0.01**k * abs(end - begin))
             failed = solver.step()
         return solver, failed
-
-    @staticmethod
-    def _next(solver: OdeSolver, until: float) -> float:
-        """How far the next step is about to go, s."""
-        return min(float(getattr(solver, "h_abs", None) or solver.step_size or 0.0), until - float(solver.t))
 
     def _near(
         self, row: Array, between: tuple[float, float], step: float, rate: Callable[[float, Array], Array], time: float

@@ -10,7 +10,7 @@ a prescribed motion does not solve.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Self
@@ -23,16 +23,15 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.bordered import RANK, nearest, newton_step
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
-from trunnion.dynamics.touching import Closed, Contacts, ContactState, Onset
+from trunnion.dynamics.touching import Closed, Contacts, Onset
 from trunnion.errors import Finding, MechanismError
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Moment", "rates_of", "repeated"]
+__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Moment", "repeated"]
 
 Array = NDArray[np.float64]
 
@@ -268,20 +267,15 @@ class FreeMotion:
         """Motion and forces. zero_slip, sliding: see `backward.Given`; of one coordinate what begins to move in its
         sense."""
         self.walked[0] += 1
+        touches = any(onset is not None for onset in at.onsets)
         given_state = Given(
             self.beginning(at) if zero_slip is None else zero_slip,
             dict(zip(self.bristles, at.bristles, strict=True)),
-            acting=self._acting(at.onsets),
+            acting=(lambda walk: self.contacts.actions(walk, at.onsets)) if touches else None,
             sliding=sliding,
             rests={joint: sense == 0 for joint, sense in zip(self.resisted, at.senses, strict=False)},
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given_state)
-
-    def _acting(self, onsets: Sequence[Onset]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
-        """What the contacts that touch do to the links."""
-        if all(onset is None for onset in onsets):
-            return None
-        return lambda walk: self.contacts.actions(walk, onsets)
 
     def beginning(self, at: Moment, share: Number = 1.0) -> dict[str, Sense]:
         """The sense in which each joint that sticks is about to move, times a share; of several coordinates those in
@@ -559,7 +553,8 @@ class FreeMotion:
         """What impulses come to, at one moment: friction in other joints takes no impulses."""
         states = self.contacts.states(self._by_rates(at))
         gaps = np.array([state.gap[0] for state in states], float)
-        return Linear(self._mass(at), *_differences(rates_of(states)), gaps)
+        rates = np.array([state.rate for state in states] + [state.slip for state in states], float)
+        return Linear(self._mass(at), *_differences(rates), gaps)
 
     def _mass(self, at: Moment) -> Array:
         """∂E/∂q̈ without friction, (equation, coordinate); one lane."""
@@ -578,14 +573,9 @@ def _differences(speeds: Array) -> tuple[Array, Array]:
     return speeds[:, 1:] - speeds[:, :1], speeds[:, 0]
 
 
-def rates_of(states: Sequence[ContactState]) -> Array:
-    """Rates of gaps, then slips, (2 contacts, lane), m/s."""
-    return np.array([state.rate for state in states] + [state.slip for state in states], float)
-
-
 def _sticks(onset: Onset) -> bool:
-    """Whether a closed contact does; a sense that is recorded is that of a slip."""
-    return isinstance(onset, Closed) and isinstance(onset.sense, int) and onset.sense == 0
+    """Whether a closed contact does."""
+    return isinstance(onset, Closed) and onset.sense == 0
 
 
 def repeated(at: Moment, times: int) -> Moment:

@@ -21,7 +21,7 @@ from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.rates import WORKS, Dynamics, Rates
-from trunnion.dynamics.rest import Meanwhile, Rest
+from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import Moment
 
@@ -68,7 +68,6 @@ class ClutchMotion(Integration):
         super().__post_init__()
         (self.drive,) = self.motion.drives.values()
         self.dynamics = self.rates = ClutchRates(self.drive, self.dynamics)
-        self.meanwhile: Meanwhile | None = None  # what prescribed drivers do while the coordinate rests
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
         self.known = "holds" if self.drive.engaged(self.start) else "opens"
 
@@ -146,20 +145,21 @@ class ClutchMotion(Integration):
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
         end = self.rest.until(time, row, until, now)
-        self.resting, self.meanwhile = True, self.rest.meanwhile(time, row, end, now)
+        self.resting = True
         try:
             return self._move(time, row, end, 0.0, now, None)[:2]
         finally:
             self.resting = False
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
-        if not self.resting:
+        rest = self.rest
+        if not self.resting or rest is None:
             return super()._rate(sense, now, between)
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
             at = self.moment(moment, numbers, 0.0, now)
-            works = self.meanwhile.powers(at.time)[:, 0] if self.meanwhile else np.zeros(len(WORKS))
+            works = rest.powers(at)[:, 0] if rest.driven else np.zeros(len(WORKS))
             return self.layout.row(np.zeros(1), self.rates.resting(at, works))
 
         return rate

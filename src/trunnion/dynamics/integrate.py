@@ -257,7 +257,7 @@ class Integration:
         def held(moments: Array) -> Array:
             rows = rest.held(time, row, moments)
             if meanwhile:
-                self.layout.works(rows)[: len(WORKS)] += meanwhile.works(moments)
+                self.layout.works(rows)[: len(WORKS)] += meanwhile(moments)
             return rows
 
         self._add(Stretch(time, end, held, 0.0, True, now, slips=self.slips))

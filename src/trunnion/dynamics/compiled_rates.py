@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
-from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, bristle_rates, works_of
+from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, beside
 from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
@@ -66,8 +66,8 @@ class CompiledRates:
         self.constant = literals({path: value for path, value in motion.values.items() if path not in varied})
         self.walks = Walks(motion)
         self.layout = Layout.of(motion)
-        self._works = 2 * self.layout.coordinates + self.layout.bristles  # where they begin
-        self._last = self._works + len(WORKS) + self.layout.touching  # of what is integrated
+        others = self.layout.bristles + len(WORKS) + self.layout.touching
+        self._last = 2 * self.layout.coordinates + others  # of what is integrated
         self._programs: dict[tuple[Any, ...], Program | None] = {}
 
     def __call__(self, at: Moment) -> Rates:
@@ -76,8 +76,7 @@ class CompiledRates:
             state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
             numbers = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
             if numbers[-1] == 0.0 and math.isfinite(numbers.sum()):
-                n, memory, rates = self.layout.coordinates, self._works, numbers[: self._last].copy()
-                return Rates(rates[:n], rates[n : 2 * n], rates[2 * n : memory], rates[memory:], True)
+                return self.layout.rates(numbers[: self._last].copy())
         return self.walks(at)
 
     def seconds(self, at: Moment) -> Array:
@@ -249,10 +248,8 @@ def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
     back = motion.solve(at, cast("Any", second), sliding=True)
     for settled in back.settled:
         doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
-    drives: Any = enumerate(motion.drives.values())
-    errors = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
     seen = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
-    return [*second, *errors, *bristle_rates(motion, at, back), *works_of(back, at, motion.contacts), *seen, doubt]
+    return [*second, *beside(motion, at, back), *seen, doubt]
 
 
 def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:

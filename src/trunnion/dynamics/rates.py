@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,8 @@ from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.system import law_of, law_parameters
 
 __all__ = [
-    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "bristle_rates", "kinetic_energy",
-    "potential_energy", "powers_of", "works_of",
+    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "kinetic_energy",
+    "potential_energy", "works_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -112,6 +111,11 @@ class Layout(NamedTuple):
         """The works, (work, lane)."""
         return rows[self.slip + self.clutched :]
 
+    def rates(self, numbers: Array, sound: bool = True, locked: bool = False) -> Rates:
+        """Rates from second derivatives and what `beside` tells, one after the other."""
+        n, memory = self.coordinates, 2 * self.coordinates + self.bristles
+        return Rates(numbers[:n], numbers[n : 2 * n], numbers[2 * n : memory], numbers[memory:], sound, locked)
+
     def row(self, rate: Array, rates: Rates) -> Array:
         """The derivative of a row."""
         return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.slip, rates.works])
@@ -126,26 +130,19 @@ class Walks:
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
-        motion, n = self.motion, self.layout.coordinates
+        motion = self.motion
         if not (np.all(np.isfinite(at.q)) and np.all(np.isfinite(at.rate))):  # of a step one of whose rates is unknown
-            unknown = np.full(2 * n + len(at.bristles) + len(self.layout.works_named), np.nan)
-            second, integral, bristles, works = np.split(unknown, [n, 2 * n, 2 * n + len(at.bristles)])
-            return Rates(second, integral, bristles, works, False)
+            return self.layout.rates(np.full(self.layout.size - self.layout.coordinates, np.nan), False)
         accelerated = motion.accelerate(at, self._last)
         if self._last is not None and not np.all(accelerated.converged & ~accelerated.turned):
-            accelerated = motion.accelerate(
-                at
-            )  # the last ones may lie on the wrong side of where a reaction turns round
+            accelerated = motion.accelerate(at)  # the last may lie on the wrong side of where a reaction turns round
         if np.all(np.isfinite(accelerated.second)):
             self._last = accelerated.second
-        integral = np.array([
-            drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(motion.drives.values())
-        ]).reshape(at.q.shape)  # fmt: skip
         sound = bool(np.all(accelerated.converged & ~accelerated.turned))
         locked = any(bool(np.any(np.less(settled.share, 1.0))) for settled in accelerated.back.settled)
-        memory = _of_one_lane(bristle_rates(motion, at, accelerated.back))
-        works = _of_one_lane(works_of(accelerated.back, at._replace(onsets=accelerated.onsets), motion.contacts))
-        return Rates(accelerated.second[:, 0], integral[:, 0], memory, works, sound, locked)
+        others = beside(motion, at._replace(onsets=accelerated.onsets), accelerated.back)
+        numbers = np.array([*accelerated.second[:, 0], *map(single, others)])
+        return self.layout.rates(numbers, sound, locked)
 
     def seconds(self, at: Moment) -> Array:
         """See `Dynamics`."""
@@ -170,42 +167,30 @@ class Walks:
         return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
 
 
-def _of_one_lane(numbers: Sequence[Number]) -> Array:
-    return np.array([single(number) for number in numbers])
-
-
-def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
-    """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
-    powers = _powers(back)
-    if contacts.each:
-        powers.append(sum((push.loss for _, push in contacts.pushes(back.walk, at.onsets)), 0.0))
-    return powers
-
-
-def powers_of(back: Backward, lanes: int) -> Array:
-    """Power of the drivers, loads and springs into the mechanism, and to friction, W; (work, lane)."""
-    return np.array([np.broadcast_to(primal(power), lanes) for power in _powers(back)], float)
-
-
-def _powers(back: Backward) -> list[Number]:
-    loads = back.walk.system.mechanism.loads
-    return [
-        sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
-        sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
-        sum((state.power for state in back.springs.values()), 0.0),
-        sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
-    ]
-
-
-def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
-    """ż = v − d(v) z of every contact with a memory, m/s."""
-    rates = list[Number]()
+def beside(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
+    """Rates of the controllers' integrals, of the deflections of bristles, ż = v − d(v) z, m/s, and of the works, W."""
+    drives: Any = enumerate(motion.drives.values())
+    rates: list[Number] = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
     for joint, deflection in zip(motion.bristles, at.bristles, strict=True):
         law, slip = law_of(motion.system, joint), primal(back.contacts[joint][0].slip)
         assert law.relaxation is not None  # or it would have no bristles
         decay = law.relaxation(slip, **law_parameters(law, motion.values, joint))
         rates.append(slip - decay * deflection)
-    return rates
+    return [*rates, *works_of(back, at, motion.contacts)]
+
+
+def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
+    """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
+    loads = back.walk.system.mechanism.loads
+    powers: list[Number] = [
+        sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
+        sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
+        sum((state.power for state in back.springs.values()), 0.0),
+        sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
+    ]
+    if contacts.each:
+        powers.append(sum((push.loss for _, push in contacts.pushes(back.walk, at.onsets)), 0.0))
+    return powers
 
 
 def kinetic_energy(walk: Forward) -> Number:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.dynamics.guards import first_crossing
-from trunnion.dynamics.rates import Layout, powers_of
+from trunnion.dynamics.rates import Layout, works_of
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.backward import Backward
 
@@ -111,7 +112,8 @@ class Rest:
     def powers(self, at: Moment) -> Array:
         """What goes into the works of `rates.WORKS`, W, (work, lane)."""
         with np.errstate(all="ignore"):
-            return powers_of(self.back(at), at.q.shape[1])
+            powers = works_of(self.back(at), at, self.motion.contacts)
+            return np.array([np.broadcast_to(primal(power), at.q.shape[1]) for power in powers], float)
 
     def meanwhile(self, begin: float, row: Array, end: float, now: float) -> Callable[[Array], Array] | None:
         """Works since the begin of a rest by time, J, (work, time), where work is done; all powers are asked for at

@@ -69,6 +69,7 @@ class CompiledRates:
         others = self.layout.bristles + len(WORKS) + self.layout.touching
         self._last = 2 * self.layout.coordinates + others  # of what is integrated
         self._programs: dict[tuple[Any, ...], Program | None] = {}
+        self._asked: tuple[Any, Program | None] = None, None
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane. This is asked for some hundred thousand times."""
@@ -106,6 +107,13 @@ class CompiledRates:
     def _program(self, what: str, at: Moment) -> Program | None:
         """The program; None while a joint sticks, where a contact of rigid bodies is closed beside friction, and where
         something cannot be recorded."""
+        asked = what, at.onsets, at.now, at.senses, at.slips
+        if asked != self._asked[0]:  # some hundred thousand times it is the last one again
+            self._asked = asked, self._program_of(what, at)
+        return self._asked[1]
+
+    def _program_of(self, what: str, at: Moment) -> Program | None:
+        """See `_program`."""
         touching = tuple(onset if isinstance(onset, Closed) else onset is not None for onset in at.onsets)
         closed = any(isinstance(onset, Closed) for onset in at.onsets)
         senses = at.senses if what == "rates" else ()

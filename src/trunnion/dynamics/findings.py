@@ -165,8 +165,8 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     elif on := _on(motion, solution):
         turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
         place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
-        what = f"{subject} stalls at {since}, {motion.names[0]} at {readable(place, unit)}, with the motor of "
-        what += f"{', '.join(on)} on: {acts}"
+        at_place, of = (f", at {readable(place, unit)}", "") if not motion.resisted else ("", f" of {', '.join(on)}")
+        what = f"{subject} stalls at {since}{at_place}, with the motor{of} on: {acts}"
         remedy = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
         figures |= {"time": rests[-1], **({"drivers": on} if motion.resisted else {"coordinate": place, "place": unit})}
         yield Finding.error(f"simulate.{codes[1]}", where, what, remedy, **figures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -78,49 +78,56 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
     at, own = readable(ended.time, "s"), ended.figures
     place = f"coordinate {own['coordinate']:.6g}" if "coordinate" in own else ""
     state = f"{place}, rate {own['rate']:.6g}" if "rate" in own else place
-    weighed: Callable[..., Finding] = Finding.error
+    where, figures = f"drivers.{driver}", {**own, "driver": driver, "unit": unit, "time": ended.time}
     remedy = "check the forces there: one of them has no value, jumps, or grows without bound"
     match ended.code.removeprefix("simulate."):
         case "range":
             what = f"{driver} reaches {readable(own['coordinate'], unit)}, the end of its stated range, at {at}: the "
             what += "motion ends there"
             remedy = f"widen drivers.{driver}.range, or stop the motion before by a load or a brake"
-            weighed = Finding.warning
+            return Finding.warning("simulate.range", where, what, remedy, **figures)
         case "no_acceleration":
             what = f"there is no acceleration at {at} ({state}), as the mechanism locks itself under its inertia: the "
             what += f"effort that an acceleration takes (det ∂E/∂q̈) is {own['growth']:.4g} of that without friction, "
             what += "and must be above 0"
             remedy = "lower the friction or the inertia behind the joints that lock; see `trunnion locking`"
+            return Finding.error("simulate.no_acceleration", where, what, remedy, **figures)
         case "unsolved":
             what = f"the accelerations are not found at {at} ({state})"
+            return Finding.error("simulate.unsolved", where, what, remedy, **figures)
         case "step":
             what = f"the integration needs steps below rounding at {at} ({state})"
+            return Finding.error("simulate.step", where, what, remedy, **figures)
         case "dead_centre":
             what = f"{driver} reaches its dead centre, {own['coordinate']:.6g} {unit}, at {at}: the links cannot be "
             what += f"assembled beyond it, and go on as {driver} reverses; the motion ends there"
             remedy = "drive a joint that has no dead centre there, or limit the motion by a stop or a load"
+            return Finding.error("simulate.dead_centre", where, what, remedy, **figures)
         case "not_assembled":
             what = f"the links cannot be assembled beyond {at} ({place}): the motion ends there"
             remedy = "limit the motion by a stop or a load, or drive a joint that has no dead centre there"
+            return Finding.error("simulate.not_assembled", where, what, remedy, **figures)
         case "events":
             what = f"there are {own['count']:.0f} events up to {at}: the motion is not followed farther"
             remedy = "ask for a shorter time"
+            return Finding.error("simulate.events", where, what, remedy, **figures)
         case "change_point":
             what = f"at {at}, at {readable(own['coordinate'], unit)} of {driver}, the links {', '.join(own['links'])} "
             what += "come to a change point, where two of their assembly modes coincide: neither reactions nor what "
             what += "follows are determined, and the motion ends there"
             remedy = f"change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake"
+            return Finding.error("simulate.change_point", where, what, remedy, **figures)
         case "evaluations":
             what = f"{own['count']:,} evaluations of the forces are used up at {at} of {readable(own['of'], 's')}: the "
             what += "motion ends there"
             remedy = "look for a stiff spring, damper or contact on a small mass; ask for a shorter --time or more "
             remedy += "--evaluations"
+            return Finding.error("simulate.evaluations", where, what, remedy, **figures)
         case _:
             what = f"there are no forces or impulses of the contacts that touch at {at} ({state}) under which nothing "
             what += "sinks in (Painlevé's paradox): the motion is kept until then"
             remedy = "lower the friction of the joints in play, or state a stiffness instead of law: rigid"
-    figures = {**own, "driver": driver, "unit": unit, "time": ended.time}
-    return weighed(ended.code, f"drivers.{driver}", what, remedy, **figures)
+            return Finding.error("simulate.no_contact_force", where, what, remedy, **figures)
 
 
 def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
@@ -135,8 +142,10 @@ def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
     what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, and {readable(energy, 'J')} is lost"
     remedy = "see `trunnion locking` for where and by how much"
     figures = {"joints": joints, "times": times, "time": locks[0].time, "energy": energy}
-    code, section = ("joints_lock", "joints") if motion.resisted else ("locks", "drivers")
-    yield Finding.warning(f"simulate.{code}", f"{section}.{joints[0]}", what, remedy, **figures)
+    if motion.resisted:
+        yield Finding.warning("simulate.joints_lock", f"joints.{joints[0]}", what, remedy, **figures)
+    else:
+        yield Finding.warning("simulate.locks", f"drivers.{joints[0]}", what, remedy, **figures)
 
 
 def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Finding]:
@@ -149,30 +158,41 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     if motion.resisted:
         shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
         joint, share = motion.resisted[int(np.argmax(shares))], float(np.max(shares))
-        where, subject, codes = f"joints.{joint}", "every free driver", ("none_starts", "all_stall", "all_rest")
+        where, subject = f"joints.{joint}", "every free driver"
         acts = f"what acts needs {share:.2%} of what resists it at rest in {joint}, and no more in the other joints"
         figures: dict[str, Any] = {"joint": joint, "share": share}
     else:
         effort = effort_units(motion.system)[list(motion.system.mechanism.drivers).index(name)]
         acting, needed = _holding(motion, solution, last)
-        where, subject, codes = f"drivers.{name}", name, ("stays_at_rest", "stalls", "rests")
+        where, subject = f"drivers.{name}", name
         acts = f"{readable(acting, effort)} act on it, and it breaks away from {readable(needed, effort)} on"
         figures = {"driver": name, "given": acting, "needed": needed, "unit": effort}
     since = readable(rests[-1], "s")
     if all(stretch.resting for stretch in solution.stretches):
         remedy = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
-        yield Finding.warning(f"simulate.{codes[0]}", where, f"{subject} does not start: {acts}", remedy, **figures)
+        what = f"{subject} does not start: {acts}"
+        if motion.resisted:
+            yield Finding.warning("simulate.none_starts", where, what, remedy, **figures)
+        else:
+            yield Finding.warning("simulate.stays_at_rest", where, what, remedy, **figures)
     elif on := _on(motion, solution):
         turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
         place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
         at_place, of = (f", at {readable(place, unit)}", "") if not motion.resisted else ("", f" of {', '.join(on)}")
         what = f"{subject} stalls at {since}{at_place}, with the motor{of} on: {acts}"
         remedy = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
-        figures |= {"time": rests[-1], **({"drivers": on} if motion.resisted else {"coordinate": place, "place": unit})}
-        yield Finding.error(f"simulate.{codes[1]}", where, what, remedy, **figures)
+        figures["time"] = rests[-1]
+        if motion.resisted:
+            yield Finding.error("simulate.all_stall", where, what, remedy, **figures, drivers=on)
+        else:
+            yield Finding.error("simulate.stalls", where, what, remedy, **figures, coordinate=place, place=unit)
     else:
         what = f"{subject} comes to rest {counted(len(rests), 'time')}, for the last time at {since}: {acts}"
-        yield Finding.note(f"simulate.{codes[2]}", where, what, **figures, time=rests[-1], times=len(rests))
+        figures |= {"time": rests[-1], "times": len(rests)}
+        if motion.resisted:
+            yield Finding.note("simulate.all_rest", where, what, **figures)
+        else:
+            yield Finding.note("simulate.rests", where, what, **figures)
 
 
 def _on(motion: FreeMotion, solution: Solution) -> list[str]:

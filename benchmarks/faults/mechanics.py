@@ -478,7 +478,7 @@ _DYNAMICS = (
     ),
     Fault(
         "twice-the-kinetic-energy",
-        "dynamics/energy.py",
+        "dynamics/rates.py",
         "energy = energy - 0.5 * algebra.power",
         "energy = energy - algebra.power",
         ("tests/reference/test_motion_in_time.py", "-k", "works_and_energies"),
@@ -533,7 +533,7 @@ _CONTACT = (
     ),
     Fault(
         "whole-stiffness-at-each-end-of-a-pin",
-        "dynamics/stated_contacts.py",
+        "dynamics/touching.py",
         'half = 0.5 * common["stiffness"]',
         'half = common["stiffness"]',
         ("tests/reference/test_pins_in_space.py", "-k", "long_pin"),

@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 from trunnion.algebra.space import ORIGIN
 from trunnion.dynamics.active import Mode, Modes, settled
 from trunnion.dynamics.bordered import least_shares
-from trunnion.dynamics.impact_law import OPEN, STICK, strike
+from trunnion.dynamics.impact_motion import OPEN, STICK, strike
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.joints.spatial_load import BearingLoad

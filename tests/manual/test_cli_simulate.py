@@ -58,7 +58,6 @@ def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path
     code, _, err = program("simulate", "s.json", "--time=1s", "--evaluations", 1000, "--out", "s.csv")
     assert code == 1
     assert "1,000 evaluations of the forces are used up at" in err
-    assert "springs.stop.stiffness = 1e+12" in err
     assert (tmp_path / "s.csv").read_text().splitlines()[-1].count(",") > 10
     code, _, err = program("simulate", "w.json", "--time=1s")
     assert code == 0

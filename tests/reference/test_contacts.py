@@ -21,7 +21,7 @@ from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.stated_contacts import contacts_of
+from trunnion.dynamics.touching import contacts_of
 from trunnion.joints.contact import CONTACT_LAWS, hertz_stiffness, loss_factor, restitution_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Dual", "depth", "derivative", "functions", "parts", "primal", "seed", "spatial"]
+__all__ = ["Dual", "depth", "derivative", "functions", "parts", "primal", "seed", "single", "spatial"]
 
 
 class Dual:
@@ -132,6 +132,11 @@ def primal(number: Any) -> Any:
     while isinstance(number, Dual):
         number = number.real
     return number
+
+
+def single(number: Any) -> float:
+    """The first lane of a number, without any ε."""
+    return float(np.ravel(primal(number))[0])
 
 
 def seed(number: Any) -> Dual:

@@ -18,16 +18,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.bordered import RANK
-from trunnion.dynamics.energy import kinetic_energy
-from trunnion.dynamics.state import Accelerated, FreeMotion, Moment, repeated
+from trunnion.dynamics.rates import kinetic_energy
+from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ActiveSet", "Case", "Lock", "Mode", "Modes", "Senses", "settled"]
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Mode = int | None  # of a row: 0 it holds, +1 or −1 it slips in that sense, None it is open
 Modes = tuple[Mode, ...]
 Senses = tuple[int, ...]
@@ -39,9 +38,7 @@ TINY = 1e-9  # of the accelerations and forces: what is none
 SOON = 1e-3  # of a typical time: how far ahead one looks for the sense of what does not move now
 IDLE = 1e-7  # of a typical speed for a typical rate: what moves a joint as little does not, now
 MOST_CASES = 4096  # which are tried one after the other where changing the worst row comes round
-MOST_MOVED = 6  # joints that may stick, up to which one looks for other accelerations
 INSTANT = 1e-12  # of a typical time: in which a joint locks
-APART = 1e-6  # of the accelerations: those that differ by as much are two
 
 
 def settled(
@@ -103,17 +100,14 @@ class ActiveSet:
         brink = crossed is not None and bool(before) and before[crossed] == 0
         case = self._consistent(at, base, may, brink)
         if case is not None and (idle := [k for k in slow if k not in may and k != crossed]):
-            ahead = self._ahead(case)
+            # relative speeds of all joints a little later, as the accelerations have it
+            second, soon = self.motion.accelerate(case).second, SOON / self.pace
+            rate = case.rate + second * soon
+            later = case._replace(q=case.q + 0.5 * (case.rate + rate) * soon, rate=rate)
+            ahead = self.motion.speeds(self.motion.walk(later, second), 1)[:, 0]
             base = [int(np.sign(ahead[k])) or 1 if k in idle else sense for k, sense in enumerate(base)]
             case = self._consistent(at, base, may, brink)
         return Case(None if case is None else case.senses, at.onsets if case is None else case.onsets, may, tuple(base))
-
-    def _ahead(self, at: Moment) -> Array:
-        """Relative speeds of all joints a little later, as the accelerations have it."""
-        second, soon = self.motion.accelerate(at).second, SOON / self.pace
-        rate = at.rate + second * soon
-        walk = self.motion.walk(at._replace(q=at.q + 0.5 * (at.rate + rate) * soon, rate=rate), second)
-        return self.motion.speeds(walk, 1)[:, 0]
 
     def _consistent(self, at: Moment, base: Sequence[int], may: Sequence[int], brink: bool) -> Moment | None:
         """The moment with the senses of all joints and the contacts that agree with forces and accelerations; None: no
@@ -178,16 +172,15 @@ class ActiveSet:
     ) -> dict[int, Mode]:
         """The worst of the contacts that pull, sink in, or slip or stick against their friction, with those on its
         wall, and what they seem to do instead. contacts: those that were closed, with their senses."""
-        pull = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
-        pull *= small * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
+        pull = self.motion.size * small * self.motion.pace**2
         force, worst = TINY * self.motion.force, list[tuple[float, int, Mode]]()
         for k, before in contacts.items():
             contact, onset = self.motion.contacts.each[k], answer.onsets[k]
-            gap, slip = (float(np.ravel(part)[0]) for part in contact.accelerations(answer.back.walk))
+            gap, slip = (single(part) for part in contact.accelerations(answer.back.walk))
             if not isinstance(onset, Closed):
                 worst.append((-gap / pull, k, before))
                 continue
-            normal, friction = (float(np.ravel(part)[0]) for part in (onset.normal, onset.friction))
+            normal, friction = (single(part) for part in (onset.normal, onset.friction))
             worst.append((-normal / force, k, None))
             if onset.sense == 0:
                 worst.append(((abs(friction) - contact.coefficient * normal) / force, k, -int(np.sign(friction))))
@@ -261,39 +254,5 @@ class ActiveSet:
         if self.of(after, senses).senses is None:
             return None
         walks = (self.motion.walk(moment, np.zeros_like(at.q)) for moment in (at, after))
-        before, left = (float(np.ravel(kinetic_energy(walk))[0]) for walk in walks)
+        before, left = (single(kinetic_energy(walk)) for walk in walks)
         return Lock(joints, after.rate[:, 0], senses, before - left)
-
-    # ---- other accelerations ----------------------------------------------------------------------------------
-
-    def several(self, at: Moment, may: Sequence[int] = ()) -> bool:
-        """Whether friction allows other accelerations than those of the senses of `at`. They are looked for, from far
-        away, where more of some acceleration takes less effort there."""
-        count, starts = len(self.motion.names), self.motion.far(np.zeros_like(at.q))
-        ends = np.array(list(itertools.product((1.0, -1.0), repeat=len(may)))).T
-        if len(may) > MOST_MOVED or not np.any(
-            self.motion.turning(at, np.repeat(starts, ends.shape[1], axis=1), may, np.tile(ends, (1, 2 * count)))
-        ):
-            return False
-        second = self.motion.accelerate(at).second
-        size = np.maximum(self.motion.unit[:, None], np.max(np.abs(second)))
-        many = repeated(at, 2 * count)
-        for modes in itertools.product((0, 1, -1), repeat=len(may)):
-            case = [modes[may.index(k)] if k in may else sense for k, sense in enumerate(at.senses)]
-            others = self.motion.searched(many._replace(senses=tuple(case)), starts)
-            apart = np.max(np.abs(others.second - second) / size, axis=0) > APART
-            if np.any(self._agrees(others, tuple(case), may) & (others.turned | apart)):
-                return True
-        return False
-
-    def _agrees(self, others: Accelerated, senses: Senses, may: Sequence[int]) -> Flags:
-        """Lanes in which the joints that may stick do what a case says."""
-        agrees = np.array(others.converged)
-        pulls = self.motion.pulls(others.back.walk, len(agrees)) / self.motion.typical[:, None]
-        small = TINY * np.maximum(1.0, np.max(np.abs(pulls), axis=0))
-        for k in may:
-            if senses[k]:
-                agrees &= senses[k] * pulls[k] >= -small
-            elif others.shares is not None:
-                agrees &= np.abs(others.shares[k]) <= 1.0 + SLACK
-        return agrees

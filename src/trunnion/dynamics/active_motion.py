@@ -10,52 +10,31 @@ complementarity, and so is which joints lock where there is none: see `active`. 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolver
 from scipy.optimize import brentq
 
-from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Case, Senses
+from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Senses
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
-from trunnion.dynamics.integrate import AHEAD, SEVERAL, Integration
-from trunnion.dynamics.rates import Seeing, Seen
-from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.integrate import Integration
+from trunnion.dynamics.rates import Seen
+from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset
 from trunnion.joints.contact import elastic_force
 
-__all__ = ["ActiveMotion", "Impact", "OpenContact", "step_nodes"]
+__all__ = ["ActiveMotion", "OpenContact", "step_nodes"]
 
 Array = NDArray[np.float64]
-Rate = Callable[[float, Array], Array]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
 CLOSELY = 33  # times about a largest force
 GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
-FEW = 8  # steps after which one looks for other accelerations
-
-
-class Impact(NamedTuple):
-    """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
-    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s,
-    and what the contact law has lost, J."""
-
-    label: str
-    begin: float
-    end: float
-    approach: float
-    separation: float
-    force: float
-    depth: float
-    wear: float
-    impulse: float
-    loss: float = 0.0
 
 
 @dataclass
@@ -74,19 +53,15 @@ class OpenContact:
 
 @dataclass
 class ActiveMotion(Integration):
-    """An integration that follows contacts and what sticks. impacts: contacts that are over."""
-
-    impacts: list[Impact] = field(default_factory=list)
+    """An integration that follows contacts and what sticks."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.seeing = cast("Seeing", self.dynamics)
         self.count = self.rows = len(self.motion.contacts.each)  # rows of `_gaps`
         self.onsets = (None,) * self.count
         self.now = self.first_now
         self._open: dict[int, OpenContact] = {}
         self._crossed: int | None = None
-        self._steps = 0
 
     def _begins(self, row: Array) -> bool:
         return self._decided(self.start, row) and super()._begins(row)
@@ -94,18 +69,6 @@ class ActiveMotion(Integration):
     def _couple(self, time: float, row: Array, now: float) -> None:
         self.now = now
         self._decided(time, row)
-
-    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
-        """The derivative of a row by time."""
-        n = self.layout.coordinates
-
-        def rate(moment: float, numbers: Array) -> Array:
-            self.solution.asked += 1
-            inside = numbers.copy()
-            inside[:n] = self._in_range(numbers[:n])
-            return self.seeing.derivative(moment, inside, self.onsets, now, self.senses)
-
-        return rate
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
@@ -117,7 +80,7 @@ class ActiveMotion(Integration):
     def _look(self, dense: Dense, times: Array) -> Seen:
         """The contacts at times of a step."""
         with np.errstate(all="ignore"):
-            return self.seeing.look(self._at(dense, times))
+            return self.dynamics.look(self._at(dense, times))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
         """Those of contacts, then those of joints."""
@@ -132,7 +95,7 @@ class ActiveMotion(Integration):
     def _gaps(self, at: Moment) -> Array:
         """Gaps, m, (contact, lane), negative where a contact that touches is open or another has closed."""
         sign = np.array([1.0 if onset is None else -1.0 for onset in self.onsets])
-        gaps: Array = sign[:, None] * self.seeing.look(at).gap if self.count else np.empty((0, len(at.time)))
+        gaps: Array = sign[:, None] * self.dynamics.look(at).gap if self.count else np.empty((0, len(at.time)))
         return gaps
 
     def _of_joints(self, at: Moment) -> Array:
@@ -177,7 +140,7 @@ class ActiveMotion(Integration):
 
     def _end(self, k: int, time: float, rate: float) -> None:
         """A contact lifts off."""
-        self.impacts.append(self._impact_of(k, self._open.pop(k), time, rate))
+        self.solution.impacts.append(self._impact_of(k, self._open.pop(k), time, rate))
         self._say(time, "lift-off", k, rate)
 
     def _impact_of(self, k: int, contact: OpenContact, end: float, rate: float) -> Impact:
@@ -216,7 +179,6 @@ class ActiveMotion(Integration):
                 elif case.senses[k] != 0 and not was:
                     self.solution.events.append(Event(time, "break-away", joint, float(case.senses[k])))
             self._rests(time, row, sticks)
-            self._others(time, row, case)
         return True
 
     def _let(self, time: float, onsets: tuple[Onset, ...]) -> None:
@@ -235,22 +197,12 @@ class ActiveMotion(Integration):
         self.senses = locked.senses
         return True
 
-    def _failed(
-        self, time: float, row: Array, sense: float, now: float, message: str | None
-    ) -> tuple[float, Array, None]:
-        """As of any motion; where there are no accelerations ahead, joints lock."""
+    def _locked(self, time: float, row: Array, sense: float, now: float, causes: Sequence[str]) -> bool:
+        """As of any motion; where several coordinates are free, some joints lock."""
         if not self.motion.resisted:
-            return super()._failed(time, row, sense, now, message)
+            return super()._locked(time, row, sense, now, causes)
         with np.errstate(all="ignore"):
-            ahead = row.copy()
-            soon, at = AHEAD / float(np.max(self.pace)), self.moment(time, row, sense, now)
-            n, second = self.layout.coordinates, np.nan_to_num(self.motion.accelerate(at).second[:, 0])
-            ahead[:n] += soon * row[n : 2 * n]
-            ahead[n : 2 * n] += soon * second
-            causes = {self._cause(when, state, sense, now) for when, state in ((time, row), (time + soon, ahead))}
-            if causes & {"locked", "no_acceleration"} and self._jammed(time, row, self.senses):
-                return time, row, None
-        return super()._failed(time, row, sense, now, message)
+            return bool({"locked", "no_acceleration"} & set(causes)) and self._jammed(time, row, self.senses)
 
     def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
         """Whether all free coordinates rest from here on, in what resists the joints."""
@@ -264,22 +216,6 @@ class ActiveMotion(Integration):
         row[n : 2 * n], self.resting = 0.0, True
         if not before:
             self._note(time, "rest")
-
-    # ---- other accelerations ----------------------------------------------------------------------------------
-
-    def _others(self, time: float, row: Array, case: Case) -> None:
-        """Tell where there are several accelerations."""
-        if not self.motion.resisted or SEVERAL in self.solution.notes:
-            return
-        if self._active.several(self.moment(time, row, 0.0, self.now), case.may):
-            self.solution.notes[SEVERAL] = {"time": time}
-
-    def _end_step(self, solver: OdeSolver, row: Array) -> None:
-        """Look for other accelerations at the end of every few steps."""
-        self._steps += 1
-        if self._steps % FEW == 0:
-            with np.errstate(all="ignore"):
-                self._others(float(solver.t), row, Case(self.senses, self.onsets, (), self.senses))
 
     # ---- what a contact comes to ------------------------------------------------------------------------------
 
@@ -297,27 +233,18 @@ class ActiveMotion(Integration):
             elastic = elastic_force(-touches.gap[k], contact.stiffness, contact.exponent)
             opening.impulse += float(weights @ normal)
             opening.loss += float(weights @ ((elastic - normal) * touches.rate[k]))
-            turns = np.flatnonzero(slip[1:] * slip[:-1] < 0.0)
-            if len(turns):
-                places = [self._turn(dense, k, times[i], times[i + 1]) for i in turns]
-                opening.wear += self._rubbed(dense, k, [begin, *places, end])
-            else:
-                opening.wear += float(weights @ np.abs(normal * slip))
+
+            def slip_at(time: float, k: int = k) -> float:
+                return float(self._look(dense, np.array([time])).slip[k, 0])
+
+            turns = [float(brentq(slip_at, *times[i : i + 2])) for i in np.flatnonzero(slip[1:] * slip[:-1] < 0.0)]
+            for low, high in pairwise([begin, *turns, end]) if turns else ():
+                parts, shares = step_nodes(low, high)
+                part = self._look(dense, parts)
+                opening.wear += float(shares @ np.abs(part.normal[k] * part.slip[k]))
+            opening.wear += 0.0 if turns else float(weights @ np.abs(normal * slip))
             opening.force = self._largest(dense, times, touches.normal[k], k, 1, opening.force)
             opening.depth = self._largest(dense, times, -touches.gap[k], k, -1, opening.depth)
-
-    def _turn(self, dense: Dense, k: int, low: float, high: float) -> float:
-        """When the slip of a contact turns round."""
-        return float(brentq(lambda time: float(self._look(dense, np.array([time])).slip[k, 0]), low, high))
-
-    def _rubbed(self, dense: Dense, k: int, ends: list[float]) -> float:
-        """Wear index of a contact, J, over parts of a step."""
-        work = 0.0
-        for begin, end in pairwise(ends):
-            times, weights = step_nodes(begin, end)
-            touches = self._look(dense, times)
-            work += float(weights @ np.abs(touches.normal[k] * touches.slip[k]))
-        return work
 
     def _largest(self, dense: Dense, times: Array, touches: Array, k: int, what: int, peak: float) -> float:
         """The largest normal force (what: 1) or penetration (−1) of a contact, from before and within a step: looked at
@@ -329,10 +256,12 @@ class ActiveMotion(Integration):
             peak = max(peak, _peak(close.normal[k] if what > 0 else -close.gap[k]))
         return peak
 
-    def finished(self) -> list[Impact]:
-        """All contacts, those that last at the end with an end that is not known."""
-        last = [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
-        return sorted([*self.impacts, *last], key=lambda impact: impact.begin)
+    def run(self, row: Array) -> Solution:
+        """The motion from an initial row; contacts that last at its end have an end that is not known."""
+        super().run(row)
+        self.solution.impacts += [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
+        self.solution.impacts.sort(key=lambda impact: impact.begin)
+        return self.solution
 
 
 def step_nodes(begin: float, end: float) -> tuple[Array, Array]:

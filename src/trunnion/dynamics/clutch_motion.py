@@ -13,17 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
-from trunnion.dynamics.rates import WORKS, Rates, Walks
-from trunnion.dynamics.rest import Meanwhile, Rest
+from trunnion.dynamics.rates import WORKS, Dynamics, Rates
+from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import Moment
 
@@ -37,8 +35,9 @@ ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry mor
 class ClutchRates:
     """The rates of a motion with those of the slip and of what is lost in it beside them."""
 
-    def __init__(self, drive: Drive, inner: CompiledRates | Walks) -> None:
+    def __init__(self, drive: Drive, inner: Dynamics) -> None:
         self.drive, self.inner = drive, inner
+        self.seconds, self.look, self.margins = inner.seconds, inner.look, inner.margins
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
@@ -68,9 +67,7 @@ class ClutchMotion(Integration):
     def __post_init__(self) -> None:
         super().__post_init__()
         (self.drive,) = self.motion.drives.values()
-        self.rates = ClutchRates(self.drive, cast("CompiledRates | Walks", self.dynamics))
-        self.dynamics = self.rates
-        self.meanwhile: Meanwhile | None = None  # what prescribed drivers do while the coordinate rests
+        self.dynamics = self.rates = ClutchRates(self.drive, self.dynamics)
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
         self.known = "holds" if self.drive.engaged(self.start) else "opens"
 
@@ -109,7 +106,7 @@ class ClutchMotion(Integration):
 
     def _carried(self, at: Moment, rests: bool) -> Array:
         """Effort through a clutch that holds, (lane,): the motor's, less what the rotor takes."""
-        second = 0.0 * at.rate[0] if rests else self.rates.inner.seconds(at)[0]
+        second = 0.0 * at.rate[0] if rests else self.dynamics.seconds(at)[0]
         shaft = self.drive.shaft(at.time, at.rate[0], at.integral[0], at.now)
         effort: Array = shaft - self.drive.inertia * self.drive.ratio * second
         return effort
@@ -148,20 +145,21 @@ class ClutchMotion(Integration):
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
         end = self.rest.until(time, row, until, now)
-        self.resting, self.meanwhile = True, self.rest.meanwhile(time, row, end, now)
+        self.resting = True
         try:
             return self._move(time, row, end, 0.0, now, None)[:2]
         finally:
             self.resting = False
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
-        if not self.resting:
+        rest = self.rest
+        if not self.resting or rest is None:
             return super()._rate(sense, now, between)
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
             at = self.moment(moment, numbers, 0.0, now)
-            works = self.meanwhile.powers(at.time)[:, 0] if self.meanwhile else np.zeros(len(WORKS))
+            works = rest.powers(at)[:, 0] if rest.driven else np.zeros(len(WORKS))
             return self.layout.row(np.zeros(1), self.rates.resting(at, works))
 
         return rate

@@ -2,7 +2,8 @@
 
 Without friction in the joints E(q, q̇, q̈) = E₀ + M q̈: one walk at rest and one for each unit acceleration give M and E₀,
 all at the same pose, so that the poses are computed once. The equation M q̈ = T − E₀ is solved by elimination as part
-of the program.
+of the program; while contacts of rigid bodies are closed their forces are unknowns beside the accelerations, and the
+accelerations of their gaps, and of the slips of those that stick, which are 0, equations beside the efforts.
 
 With friction E is not affine: rounds of Newton's method, each with the walks for its own slopes, are a loop of the
 program, and where they or the friction did not settle the walks are asked. What contacts touch, in which sense joints
@@ -12,62 +13,34 @@ slide and what is switched on decides which program it is; while a joint sticks 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
-from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, bristle_rates, works_of
-from trunnion.dynamics.state import DIFFERENCE, FreeMotion, Moment
+from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, beside
+from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
 
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = [
-    "Codes",
-    "CompiledRates",
-    "Figures",
-    "Kinds",
-    "columns_of",
-    "compilable",
-    "eliminated",
-    "errors_of",
-    "missing_of",
-    "rates_of",
-]
+__all__ = ["Codes", "CompiledRates", "compilable", "rates_of"]
 
 Array = NDArray[np.float64]
-Figures = Callable[[FreeMotion, Moment], list[Number]]  # what a program computes, of a recorded motion
 
 ROUNDS = 5  # of Newton's method in a program
 CLOSE = 1e-8  # of an acceleration: a last step of which the next is below rounding
 MOST_LANES = 64  # that a program takes at a time
-TOUCHES, SLIPS, STICKS = 1, 2, 3  # how a contact touches: by a law, or closed between rigid bodies
-TOLD = (TOUCHES, SLIPS)  # of which something is told
 TRIAL = "trial."  # in the path of an acceleration, see `FreeMotion.trial`
-Kinds = tuple[int | None, ...]
 # by what it is for, with the numbers that are compiled in; None where something cannot be recorded
 Codes = dict[tuple[Any, ...], "Code | None"]
-
-
-def _kind(onset: Onset) -> int | None:
-    if isinstance(onset, Closed):
-        return SLIPS if onset.sense else STICKS
-    return None if onset is None else TOUCHES
-
-
-def _onset(kind: int | None, onsets_given: Iterator[Any]) -> Onset:
-    """The contact of a kind, with what is told of it: speed of approach, or sense of the slip."""
-    if kind == SLIPS:
-        return Closed(next(onsets_given))
-    return next(onsets_given) if kind == TOUCHES else Closed(0) if kind == STICKS else None
 
 
 def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> CompiledRates | Walks:
@@ -93,81 +66,68 @@ class CompiledRates:
         self.constant = literals({path: value for path, value in motion.values.items() if path not in varied})
         self.walks = Walks(motion)
         self.layout = Layout.of(motion)
-        self._works = 2 * self.layout.coordinates + self.layout.bristles  # where they begin
-        self.last = self._works + len(WORKS) + self.layout.touching  # of the numbers that are integrated
+        others = self.layout.bristles + len(WORKS) + self.layout.touching
+        self._last = 2 * self.layout.coordinates + others  # of what is integrated
         self._programs: dict[tuple[Any, ...], Program | None] = {}
+        self._asked: tuple[Any, Program | None] = None, None
 
     def __call__(self, at: Moment) -> Rates:
-        """The rates; one lane."""
+        """The rates; one lane. This is asked for some hundred thousand times."""
         if program := self._program("rates", at):
             state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
-            rates = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
-            if rates[-1] == 0.0 and math.isfinite(rates.sum()):
-                n, memory, rates_last = self.layout.coordinates, self._works, rates[: self.last].copy()
-                return Rates(
-                    rates_last[:n], rates_last[n : 2 * n], rates_last[2 * n : memory], rates_last[memory:], True
-                )
+            numbers = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
+            if numbers[-1] == 0.0 and math.isfinite(numbers.sum()):
+                return self.layout.rates(numbers[: self._last].copy())
         return self.walks(at)
 
     def seconds(self, at: Moment) -> Array:
-        """See `Walks.seconds`."""
-        if program := self._program("rates", at):
-            numbers = program.run(at)
-            if np.all(numbers[-1] == 0.0) and np.all(np.isfinite(numbers)):
-                return numbers[: self.layout.coordinates]
-        return self.walks.seconds(at)
-
-    def derivative(
-        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
-    ) -> Array:
-        """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
-        if program := self._program_of("rates", onsets, now, senses):
-            n, slopes = self.layout.coordinates, np.empty(len(row))
-            rates = program.of_row(time, row[: self.layout.slip], onsets)
-            slopes[:n], slopes[n:] = row[n : 2 * n], rates[: self.last]
-            if rates[-1] == 0.0 and math.isfinite(slopes.sum()):
-                return slopes
-        return self.walks.derivative(time, row, onsets, now, senses)
+        """See `rates.Dynamics`."""
+        numbers = self._numbers("rates", at)
+        return self.walks.seconds(at) if numbers is None else numbers[: self.layout.coordinates]
 
     def margins(self, at: Moment) -> Array:
-        """See `FreeMotion.margins`, (module, lane)."""
-        if program := self._program("margins", at):
-            numbers = program.run(at)
-            if not np.any(numbers[-1]):
-                return numbers[:-1]
-        return self.walks.margins(at)
+        """See `rates.Dynamics`."""
+        numbers = self._numbers("margins", at)
+        return self.walks.margins(at) if numbers is None else numbers
 
     def look(self, at: Moment) -> Seen:
-        """See `rates.Seeing`."""
-        if program := self._program("look", at):
-            numbers = program.run(at)
-            if not np.any(numbers[-1]):
-                return Seen(*numbers[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
-        return self.walks.look(at)
+        """See `rates.Dynamics`."""
+        closed = any(isinstance(onset, Closed) for onset in at.onsets)
+        numbers = self._numbers("rates" if closed else "look", at)
+        if numbers is None:
+            return self.walks.look(at)
+        return Seen(*numbers[self._last if closed else 0 :].reshape(len(Seen._fields), -1, at.q.shape[1]))
+
+    def _numbers(self, what: str, at: Moment) -> Array | None:
+        """The numbers of a program, (number, lane); None where there is any doubt."""
+        program = self._program(what, at)
+        numbers = None if program is None else program.run(at)
+        return None if numbers is None or np.any(numbers[-1]) else numbers[:-1]
 
     def _program(self, what: str, at: Moment) -> Program | None:
-        return self._program_of(what, at.onsets, at.now, at.senses if what == "rates" else (), at.slips)
+        """The program; None while a joint sticks, where a contact of rigid bodies is closed beside friction, and where
+        something cannot be recorded."""
+        asked = what, at.onsets, at.now, at.senses, at.slips
+        if asked != self._asked[0]:  # some hundred thousand times it is the last one again
+            self._asked = asked, self._program_of(what, at)
+        return self._asked[1]
 
-    def _program_of(
-        self, what: str, onsets: Sequence[Onset], now: float, senses: tuple[int, ...], slips: float = 0.0
-    ) -> Program | None:
-        """The program; None while a joint sticks, and where something cannot be recorded."""
-        if 0 in senses:
+    def _program_of(self, what: str, at: Moment) -> Program | None:
+        """See `_program`."""
+        touching = tuple(onset if isinstance(onset, Closed) else onset is not None for onset in at.onsets)
+        closed = any(isinstance(onset, Closed) for onset in at.onsets)
+        senses = at.senses if what == "rates" else ()
+        if 0 in senses or (closed and not self.motion.affine):
             return None
-        kinds, switches = tuple(map(_kind, onsets)), tuple(drive.switches(now) for drive in self.motion.drives.values())
-        key = what, kinds, switches, senses, slips
+        switches = tuple(drive.switches(at.now) for drive in self.motion.drives.values())
+        key = what, touching, switches, senses, at.slips
         if key not in self._programs:
             key_of_all = *key, self.motion.affine, self.motion.rests, *self.constant.items()
             if key_of_all not in self.codes:
-                figures = self.figures(what, kinds)
-                self.codes[key_of_all] = _code(self.motion, figures, kinds, switches, senses, slips, self.constant)
+                self.codes[key_of_all] = _code(self.motion, what, touching, switches, senses, at.slips, self.constant)
             code = self.codes[key_of_all]
             self._programs[key] = None if code is None else Program(self.motion, code)
         return self._programs[key]
-
-    def figures(self, what: str, kinds: Kinds) -> Figures:
-        """What a program computes: the rates, how near assemblies are to each other, or how the contacts are."""
-        return {"rates": _rates_of, "margins": _margins, "look": _seen}[what]
 
 
 class Code(NamedTuple):
@@ -185,12 +145,13 @@ class Code(NamedTuple):
 
 
 def _code(
-    motion: FreeMotion, figures: Figures, kinds: Kinds, switches: Sequence[tuple[bool, bool, bool]],
+    motion: FreeMotion, what: str, touching: Sequence[bool | Closed], switches: Sequence[tuple[bool, bool, bool]],
     senses: tuple[int, ...], slips: float, constant: Mapping[str, Any],
 ) -> Code | None:  # fmt: skip
     """Record some numbers of a motion, and compile what is recorded; None where something cannot be recorded.
 
-    constant: numbers that are compiled in.
+    what: the rates, how near assemblies are to each other, or how the contacts are; touching: of every contact whether
+    it touches, or how it is closed; constant: numbers that are compiled in.
     """
     from trunnion.engines.graph import POSITION, Graph
     from trunnion.engines.machine_code import MachineCode, vector_width
@@ -203,11 +164,12 @@ def _code(
     variables = (*(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n)), *motion.bristles)
     states = ("time", *(f"state.{name}" for name in variables), "sense")
     time, *state, sense = [Recorded(graph, graph.input(name, POSITION)) for name in states]
-    onsets = tuple(f"onset{k}" for k, kind in enumerate(kinds) if kind in TOLD)
-    onsets_given: Any = iter([Recorded(graph, graph.input(name, 0)) for name in onsets])
+    onsets = {k: f"onset{k}" for k, touches in enumerate(touching) if touches is True}
+    approach: dict[int, Any] = {k: Recorded(graph, graph.input(name, 0)) for k, name in onsets.items()}
     q, rate, integral, bristles = cast("Any", (state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]))
-    touching = tuple(_onset(kind, onsets_given) for kind in kinds)
-    at = Moment(cast("Any", time), q, rate, integral, bristles, onsets=touching, senses=senses, slips=slips)
+    begun = tuple(each if isinstance(each, Closed) else approach.get(k) for k, each in enumerate(touching))
+    at = Moment(cast("Any", time), q, rate, integral, bristles, onsets=begun, senses=senses, slips=slips)
+    figures = {"rates": _rates_of, "margins": _margins, "look": _seen}[what]
     if motion.rests:  # also where a speed is lost in rounding, it is known in which sense joints slide
         at = at._replace(sense=cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)))
     try:
@@ -219,7 +181,8 @@ def _code(
     for number in graph.doubts:
         doubt = graph.apply("max", doubt, graph.as_float(number))
     outputs = [*outputs_asked, graph.as_float(doubt)]
-    return Code(MachineCode(program(graph, outputs, vector_width())), paths, states, onsets, len(outputs))
+    machine = MachineCode(program(graph, outputs, vector_width()))
+    return Code(machine, paths, states, tuple(onsets.values()), len(outputs))
 
 
 def _numbers(motion: FreeMotion) -> dict[str, Any]:
@@ -235,7 +198,7 @@ class Program:
 
         values = _numbers(motion)
         self.lanes, self.width, self.onsets = MOST_LANES, vector_width(), code.onsets
-        self.numbers = {path: np.array([float(np.ravel(primal(values[path]))[0])]) for path in code.paths}
+        self.numbers = {path: np.array([single(values[path])]) for path in code.paths}
         self.numbers.update({name: np.zeros(1) for name in code.onsets})
         self.state = np.zeros((len(code.states), self.lanes))
         self.numbers.update(zip(code.states, self.state, strict=True))
@@ -268,9 +231,9 @@ class Program:
         return values
 
     def _begin(self, onsets: Sequence[Onset]) -> None:
-        onsets_given = [onset.sense if isinstance(onset, Closed) else onset for onset in onsets if _kind(onset) in TOLD]
-        for name, number in zip(self.onsets, onsets_given, strict=True):
-            self.numbers[name][0] = number
+        begun = (onset for onset in onsets if onset is not None and not isinstance(onset, Closed))
+        for name, onset in zip(self.onsets, begun, strict=True):
+            self.numbers[name][0] = onset
 
 
 # ---- what is recorded -----------------------------------------------------------------------------------------
@@ -282,39 +245,35 @@ def _recorded(motion: FreeMotion, values: dict[str, Any], switches: Sequence[tup
     own_drives = {name: drive.switched(*on) for (name, drive), on in zip(own_drives.items(), switches, strict=True)}
     recorded = replace(motion, run=replace(motion.run, values=values), drives=own_drives)
     trial = [values[f"{TRIAL}{name}"] for name in motion.names]
-    vars(recorded).update(affine=motion.affine, resisted=motion.resisted, trial=trial)
+    vars(recorded).update(affine=motion.affine, resisted=motion.resisted, trial=trial, force=motion.force)
     return recorded
 
 
 def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
-    """Accelerations, rates of the controllers' integrals and of deflections, works, as `rates.Walks` has them; 1 where
-    there is doubt."""
-    doubt: Number = 0.0
-    if motion.affine:
-        second = _affine(motion, at)
-    else:
-        second, doubt = _by_rounds(motion, at)
+    """Accelerations, rates of the controllers' integrals and of deflections, works, as `rates.Walks` has them, where
+    contacts of rigid bodies are closed also what `rates.Seen` has; 1 where there is doubt."""
+    second, at, doubt = _affine(motion, at) if motion.affine else _by_rounds(motion, at)
     back = motion.solve(at, cast("Any", second), sliding=True)
     for settled in back.settled:
         doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
-    memory = bristle_rates(motion, at, back)
-    return [*second, *errors_of(motion, at), *memory, *works_of(back, at, motion.contacts), doubt]
+    seen = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
+    return [*second, *beside(motion, at, back), *seen, doubt]
 
 
-def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Number]:
-    """Accelerations by Newton's method with slopes by differences, and 1 where it did not end, or where more
-    acceleration takes less effort."""
+def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
+    """Accelerations by Newton's method with slopes by differences, the moment, and 1 where it did not end, or where
+    more acceleration takes less effort."""
     count, unit = len(motion.names), motion.trial
 
     def step(numbers: list[Number]) -> list[Number]:
         second, columns = numbers[:count], []
-        missed = missing_of(motion, at, second)
+        missed = _missed(motion, at, second)
         for k, size in enumerate(unit):
             ahead = DIFFERENCE * np.maximum(np.abs(second[k]), 1e-2 * size)
             ahead = np.where(second[k] < 0.0, -ahead, ahead)
             tried = [number + ahead if i == k else number for i, number in enumerate(second)]
-            columns.append([(a - b) / ahead for a, b in zip(missing_of(motion, at, tried), missed, strict=True)])
-        change, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], missed)
+            columns.append([(a - b) / ahead for a, b in zip(_missed(motion, at, tried), missed, strict=True)])
+        change, pivots = _eliminated([list(row) for row in zip(*columns, strict=True)], missed)
         turned: Number = 1.0  # the sign of the determinant, see `state.Accelerated`
         for pivot in pivots:
             turned = np.where(pivot > 0.0, turned, -turned)
@@ -326,41 +285,48 @@ def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Number]:
     for number, change, size in zip(step_and_change[:count], step_and_change[count:], unit, strict=True):
         small = CLOSE * np.maximum(np.abs(number), 1e-2 * size)
         doubt = np.maximum(doubt, np.where(np.abs(change) <= small, 0.0, 1.0))
-    return step_and_change[:count], doubt
+    return step_and_change[:count], at, doubt
 
 
-def _affine(motion: FreeMotion, at: Moment) -> list[Number]:
-    """Accelerations where efforts are affine in them."""
-    nothing: Any = [0.0] * len(motion.names)
-    matrix = [list(row) for row in zip(*columns_of(motion, at), strict=True)]
-    return eliminated(matrix, [-number for number in missing_of(motion, at, nothing)])[0]
+def _affine(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
+    """Accelerations where efforts are affine in them, the moment with the forces of closed contacts, and 1 where there
+    is doubt.
 
-
-def columns_of(motion: FreeMotion, at: Moment) -> list[list[Number]]:
-    """The columns of M, from rest and without contacts, whose forces would leave no digits to the differences."""
-    count = len(motion.names)
+    The columns of M are told from rest and without contacts, whose forces would leave no digits to the differences.
+    """
+    count, active = len(motion.names), motion.held(at)
     nothing: Any = [0.0] * count
+    free = at._replace(onsets=tuple(None if isinstance(onset, Closed) else onset for onset in at.onsets))
     still = at._replace(rate=nothing, onsets=(None,) * len(at.onsets))
-    zero, columns = missing_of(motion, still, nothing), []
+    zero, columns = _missed(motion, still, nothing, active), []
     for k, size in enumerate(motion.trial):
         step = [size if i == k else 0.0 for i in range(count)]
-        columns.append(
-            [(number - rest) / size for number, rest in zip(missing_of(motion, still, step), zero, strict=True)]
-        )
-    return columns
+        moved = _missed(motion, still, step, active)
+        columns.append([(number - rest) / size for number, rest in zip(moved, zero, strict=True)])
+    contacts = len(zero) - count
+    for k in range(contacts):
+        forces = [motion.force if i == k else 0.0 for i in range(contacts)]
+        pushed = _missed(motion, still._replace(onsets=motion.forced(at.onsets, forces, active)), nothing)
+        efforts: list[Number] = [(number - rest) / motion.force for number, rest in zip(pushed, zero, strict=False)]
+        columns.append(efforts + [0.0] * contacts)
+    right = [-number for number in _missed(motion, free, nothing, active)]
+    numbers, pivots = _eliminated([list(row) for row in zip(*columns, strict=True)], right)
+    doubt: Number = 0.0
+    if contacts:
+        for pivot in pivots:  # where one is not above 0 the forces have no solution, or several
+            doubt = np.maximum(doubt, np.where(pivot > 0.0, 0.0, 1.0))
+        onsets = motion.forced(at.onsets, numbers[count:], active)
+        at = at._replace(onsets=motion.shared(onsets, active.walls))
+    return numbers[:count], at, doubt
 
 
-def errors_of(motion: FreeMotion, at: Moment) -> list[Number]:
-    """Rates of the controllers' integrals."""
-    drives: Any = enumerate(motion.drives.values())
-    return [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
-
-
-def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
-    """E − T of every free coordinate."""
+def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) -> list[Number]:
+    """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0."""
     back = motion.solve(at, second, sliding=True)
     driven = motion.driven(at, second, motion.beginning(at))
-    return [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
+    moved = {k: motion.contacts.each[k].accelerations(back.walk) for k in active.closed}
+    efforts = [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
+    return [*efforts, *(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)]
 
 
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
@@ -377,7 +343,7 @@ def _margins(motion: FreeMotion, at: Moment) -> list[Number]:
     return [*motion.margins(motion.walk(at, nothing)), 0.0]
 
 
-def eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], list[Number]]:
+def _eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], list[Number]]:
     """x of A x = b and the pivots, without exchange of rows: all positive of a mass matrix, and of one with the forces
     of contacts behind it where these have a solution."""
     count, pivots = len(right), list[Number]()

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.checks import refuse, refuse_undetermined
+from trunnion.algebra.dual import single
+from trunnion.dynamics.checks import check_start, refuse, refuse_undetermined
 from trunnion.dynamics.compiled_rates import Codes, CompiledRates, rates_of
-from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.filling import Books, filled
+from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import integration_of
 from trunnion.dynamics.rates import Walks
-from trunnion.dynamics.result import Books, motion_findings
-from trunnion.dynamics.simulate import check_start
 from trunnion.dynamics.solution import CLOSE, Solution
-from trunnion.dynamics.start import initial_row, places, ranges
+from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
@@ -71,11 +71,11 @@ class Continued:
         self.inputs = {applied_to(name): 0.0 for name in self.motion.names}
         for path, entry in mechanism.parameter_set.entries.items():
             if path.startswith("loads.") and ".resisting" not in path and not entry.varies:
-                self.inputs[path] = float(np.ravel(np.asarray(self.run.values[path]))[0])
+                self.inputs[path] = single(self.run.values[path])
         self._varied, self._applied = frozenset(self.inputs), dict[str, float]()
         self._codes: Codes = {}
         self._places, self._row, self._senses = places(self.motion), initial_row(self.motion), tuple[int, ...]()
-        check_start(self.motion, self._row, ranges(self.motion, self.motion.names, self._places))
+        check_start(self.motion, self._row, self._places.limits)
         self._snapshot: Snapshot | None = None
         self._rates: CompiledRates | Walks = Walks(self.motion)
         self._end: Books | None = None
@@ -121,4 +121,4 @@ class Continued:
     @np.errstate(all="ignore")
     def _books(self, solution: Solution, time: float) -> Books:
         """Every variable at a time, s."""
-        return Filling(self.motion, solution, np.array([time])).books()
+        return filled(self.motion, solution, np.array([time]))

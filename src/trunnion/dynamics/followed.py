@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.solve.forward import Forward, Motion
@@ -55,7 +55,7 @@ class Followed:
             return group.position(elements, self.chosen, drive)
         if not group.BRANCHES:
             last = self.snapshot.poses[self.number]
-            return group.position(elements, [float(np.ravel(primal(last.q[i]))[0]) for i in group.kept], drive)
+            return group.position(elements, [single(last.q[i]) for i in group.kept], drive)
         first_branch, other = group.BRANCHES
         misses = [
             self._miss(group, group.position(elements, branch, drive), walk, time) for branch in (first_branch, other)
@@ -90,7 +90,7 @@ def follows(run: Run, several: bool) -> tuple[Any, ...]:
     """
     if not several:
         return run.chosen.assembly
-    pace = float(np.ravel(primal(run.system.pace(run.values)))[0])
+    pace = single(run.system.pace(run.values))
     following: list[Any] = []
     for number, chosen in enumerate(run.chosen.assembly):
         closed = chosen is not None and len(run.system.groups[number].BRANCHES) == 2

@@ -1,34 +1,153 @@
 """Motion in time with joints in play between rigid bodies: from impact to impact, and closed in between.
 
-A step ends where a gap closes, and Newton's law gives the rates after it (`impact_law`). Where the rebounds become
+A step ends where a gap closes, and Newton's law gives the rates after it (`strike`). Where the rebounds become
 lower than what the gap is known to, the impacts accumulate: the contact closes, and stays so under a force that keeps
-its gap at 0 (`closed`), until that force becomes 0. A closed contact slips or sticks; a change of that ends a step,
+its gap at 0, until that force becomes 0. A closed contact slips or sticks; a change of that ends a step,
 too. Where impacts of several places crowd without end, one without restitution ends them.
+
+Several places may strike at once. Impulses Λ at them change the rates of gaps and slips, γ⁺ = γ⁻ + G Λ with
+G = W M⁻¹ Wᵀ. At every place either nothing is exchanged and γₙ⁺ ≥ −e γₙ⁻, or γₙ⁺ = −e γₙ⁻ with an impulse Λₙ ≥ 0 and
+one along the tangent, |Λₜ| ≤ f Λₙ, that is −f Λₙ times the sign of the slip γₜ⁺: a linear complementarity problem (Ch.
+Glocker, F. Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley, 1996; without tangential restitution). Its
+cases change by the worst place first, see `active.settled`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.active import MEET as SLOW
-from trunnion.dynamics.active_motion import ActiveMotion, Dense, Impact, OpenContact, step_nodes
+from trunnion.dynamics.active import Mode, Modes, settled
+from trunnion.dynamics.active_motion import ActiveMotion, OpenContact, step_nodes
 from trunnion.dynamics.bordered import nearest
-from trunnion.dynamics.impact_law import OPEN, Struck, strike
-from trunnion.dynamics.rates import Rigid, Seen
-from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.solution import Event, Impact, Stretch
 from trunnion.dynamics.state import Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
-__all__ = ["ImpactMotion"]
+__all__ = ["OPEN", "STICK", "ImpactMotion", "Struck", "strike"]
 
 Array = NDArray[np.float64]
+
+OPEN, STICK = None, 0
+
+CLOSE = 1e-12  # of the largest speed or impulse: differences that are rounding
+HALVINGS = 60
+
+
+class Struck(NamedTuple):
+    """Impulses, N s, rates after the impact, m/s, (normals then tangents,), what every place did - None: nothing, else
+    the sense of its slip, 0 where it sticks -, the loss, J, and the restitution that was kept of the one stated."""
+
+    impulse: Array
+    after: Array
+    cases: Modes
+    loss: float
+    kept: float = 1.0
+
+
+def strike(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:
+    """The impact at some places; None if no case fits.
+
+    delassus: G, 1/kg, (2 places, 2 places); before: γ⁻, m/s, (2 places,), normals first; restitution, friction: of each
+    place.
+    Newton's law may gain energy where friction turns the slip round (T. R. Kane, D. A. Levinson, Dynamics: Theory and
+    Applications, McGraw-Hill, 1985); the restitutions are then lowered together until nothing is gained, for without
+    any the law always loses.
+    """
+    struck = _struck(delassus, before, restitution, friction)
+    if struck is None:
+        return None
+    if struck.loss >= -CLOSE * float(np.abs(struck.impulse) @ (np.abs(before) + np.abs(struck.after))):
+        return struck
+    low, high, best = 0.0, 1.0, None
+    for _ in range(HALVINGS):
+        share = 0.5 * (low + high) if best is not None else 0.0
+        tried = _struck(delassus, before, share * restitution, friction)
+        if tried is not None and tried.loss >= 0.0:
+            low, best = share, tried._replace(kept=share)
+        elif best is None:
+            return tried
+        else:
+            high = share
+    return best
+
+
+def _struck(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:
+    """The case to which no place objects; at first none exchanges anything."""
+    places = len(restitution)
+    back = -restitution * np.minimum(before[:places], 0.0)
+
+    def objections(cases: Modes) -> Mapping[int, Mode] | None:
+        impulse, after = _solved(delassus, before, back, friction, cases)
+        return _objections(impulse, after, before, back, friction, cases)
+
+    senses = _senses(before)
+    choices = [(OPEN, s, STICK, -s) if f > 0.0 else (OPEN, s) for f, s in zip(friction, senses, strict=True)]
+    cases = settled([OPEN] * places, objections, choices)
+    if cases is None:
+        return None
+    impulse, after = _solved(delassus, before, back, friction, cases)
+    return Struck(impulse, after, cases, -0.5 * float(impulse @ (before + after)))
+
+
+def _solved(delassus: Array, before: Array, back: Array, friction: Array, cases: Modes) -> tuple[Array, Array]:
+    """Impulses and rates after of one case: as many equations as places that exchange something."""
+    places = len(cases)
+    unknown, targets, spread = list[int](), list[float](), np.zeros((2 * places, 2 * places))
+    for k, case in enumerate(cases):
+        if case is not OPEN:
+            spread[k, k], spread[places + k, k] = 1.0, -friction[k] * case
+            unknown.append(k)
+            targets.append(back[k] - before[k])
+        if case == STICK:
+            spread[places + k, places + k] = 1.0
+            unknown.append(places + k)
+            targets.append(-before[places + k])
+    if not unknown:
+        return np.zeros(2 * places), before
+    rows, columns = np.array(unknown), spread[:, unknown]
+    matrix = delassus[rows] @ columns
+    numbers = np.linalg.lstsq(matrix, np.array(targets), rcond=1e-13)[0]  # two places may share one impulse
+    impulse: Array = columns @ numbers
+    return impulse, before + delassus @ impulse
+
+
+def _senses(before: Array) -> list[int]:
+    """Of the slips before."""
+    return [-1 if slip < 0.0 else 1 for slip in before[len(before) // 2 :]]
+
+
+def _objections(
+    impulse: Array, after: Array, before: Array, back: Array, friction: Array, cases: Modes
+) -> Mapping[int, Mode] | None:
+    """The place that breaks its law most, and what it seems to do instead; None: the equations of a case, which were
+    singular, are not kept."""
+    places, senses = len(cases), _senses(before)
+    normal, tangent, size = impulse[:places], impulse[places:], CLOSE * max(float(np.max(np.abs(impulse))), 1e-300)
+    speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
+    worst: list[tuple[float, int, Mode]] = [(1.0, -1, OPEN)]
+    for k, case in enumerate(cases):
+        gap, slip = (after[k] - back[k]) / speed, after[places + k] / speed
+        if case is OPEN:
+            worst.append((-gap, k, senses[k]))
+            continue
+        if abs(gap) > 1.0 or (case == STICK and abs(slip) > 1.0):
+            return None
+        worst.append((-normal[k] / size, k, OPEN))
+        if case == STICK:
+            worst.append(((abs(tangent[k]) - friction[k] * normal[k]) / size, k, -int(np.sign(tangent[k]))))
+        elif friction[k] > 0.0:
+            worst.append((-case * slip, k, STICK))
+    _, k, mode = max(worst, key=lambda miss: miss[0])
+    return {} if k < 0 else {k: mode}
+
 
 LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
 MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
@@ -47,28 +166,21 @@ class ImpactMotion(ActiveMotion):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.rows = 2 * self.count
-        self.rigid, each = cast("Rigid", self.dynamics), self.motion.contacts.each
+        each = self.motion.contacts.each
         self.friction = np.array([contact.coefficient for contact in each])
         self.restitution = np.array([contact.restitution for contact in each])
-        size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
         self.meet = MEET * self.motion.contacts.least_clearance
-        self.low = np.array([max(LOW * contact.clearance, ROUNDED * size) for contact in self.motion.contacts.each])
+        self.low = np.array(
+            [max(LOW * contact.clearance, ROUNDED * self.motion.size) for contact in self.motion.contacts.each]
+        )
 
     # ---- what ends a step -------------------------------------------------------------------------------------
-
-    def _touches(self, dense: Dense, times: Array) -> Seen:
-        """The contacts with their forces at times of a step."""
-        with np.errstate(all="ignore"):
-            return self.rigid.touches(self._at(dense, times))
 
     def _gaps(self, at: Moment) -> Array:
         """What stays above 0 within a step, (2 contacts, lane): gap or normal force, and slip or what friction has left
         before it slips."""
         values = np.ones((2 * self.count, len(at.time)))
-        if not any(self.onsets):
-            values[: self.count] = self.rigid.look(at).gap
-            return values
-        touches = self.rigid.touches(at)
+        touches = self.dynamics.look(at)
         for k, onset in enumerate(self.onsets):
             values[k] = touches.normal[k] if onset else touches.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
@@ -81,7 +193,7 @@ class ImpactMotion(ActiveMotion):
         if not self._open:
             return
         times, weights = step_nodes(stretch.begin, stretch.end)
-        touches = self._touches(stretch.state, times)
+        touches = self._look(stretch.state, times)
         for k, contact in self._open.items():
             contact.force = np.fmax(contact.force, float(np.max(touches.normal[k])))
             contact.impulse += float(weights @ touches.normal[k])
@@ -98,20 +210,18 @@ class ImpactMotion(ActiveMotion):
             self._end(contact, time, 0.0)
             self._set({contact: None})
             return np.inf
-        together = [other for other in self._closed() if self._surface(other) == self._surface(contact)]
+        each = self.motion.contacts.each
+        together = [other for other in self._closed() if each[other].surface == each[contact].surface]
         if onset.sense:  # the slip ends
             self._set(dict.fromkeys(together, Closed(0)))
             self._project(time, row)
         else:
-            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[contact, 0]
+            friction = self._look(lambda times: row[:, None], np.array([time])).friction[contact, 0]
             self._set(dict.fromkeys(together, Closed(-int(np.sign(friction)))))
         return np.inf
 
     def _closed(self) -> list[int]:
         return [k for k, onset in enumerate(self.onsets) if onset is not None]
-
-    def _surface(self, k: int) -> str:
-        return self.motion.contacts.each[k].surface
 
     def _set(self, onsets: Mapping[int, Closed | None]) -> None:
         self.onsets = tuple(onsets.get(k, onset) for k, onset in enumerate(self.onsets))
@@ -122,7 +232,7 @@ class ImpactMotion(ActiveMotion):
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
         at = self.moment(time, row, 0.0, 0.0)
-        linear = self.rigid.linear(at)
+        linear = self.motion.linear(at)
         rates = linear.driven + linear.ways @ at.rate[:, 0]
         meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
@@ -141,9 +251,15 @@ class ImpactMotion(ActiveMotion):
         struck, change = law
         if crowded:
             self.recent.clear()
-        if crowded or struck.kept < 1.0:
-            self._lowered(time, 0.0 if crowded else struck.kept)
-        self._strike_off(row, change, self._driven(at, change, struck, places, linear.driven), struck.loss)
+        if crowded or struck.kept < 1.0:  # an impact kept less than its restitution
+            first = {"times": 0, "time": time, "share": 1.0}
+            note = self.solution.notes.setdefault("simulate.restitution_lowered", first)
+            note["times"] += 1
+            note["share"] = min(note["share"], 0.0 if crowded else struck.kept)
+        n, works = self.layout.coordinates, self.layout.works(row)
+        row[n : 2 * n] += change
+        works[0] += self._driven(at, change, struck, places, linear.driven)
+        works[-1] += struck.loss
         self._after(time, row, places, rates, struck, pauses)
         return FLIGHT * min((pause for pause, low in flights.values() if not low), default=np.inf)
 
@@ -163,25 +279,9 @@ class ImpactMotion(ActiveMotion):
             return 0.0
         free = at._replace(onsets=(None,) * self.count)
         still, struck_so = (self.motion.solve(free, second) for second in (0.0 * at.q, change[:, None]))
-        put_in = sum(
-            float(np.ravel(primal((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)))[0])
-            for name in names
-        )
+        put_in = sum(single((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)) for name in names)
         rows = [*places, *(self.count + k for k in places)]
         return put_in - float(struck.impulse @ driven[rows])
-
-    def _strike_off(self, row: Array, change: Array, drive: float, loss: float) -> None:
-        """Let an impact change a row: rates, and the works of drivers and contacts."""
-        n, works = self.layout.coordinates, self.layout.works(row)
-        row[n : 2 * n] += change
-        works[0] += drive
-        works[-1] += loss
-
-    def _lowered(self, time: float, energy_left: float) -> None:
-        """Take down that an impact kept less than its restitution."""
-        note = self.solution.notes.setdefault("simulate.restitution_lowered", {"times": 0, "time": time, "share": 1.0})
-        note["times"] += 1
-        note["share"] = min(note["share"], energy_left)
 
     def _flights(
         self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, change: Array
@@ -197,7 +297,7 @@ class ImpactMotion(ActiveMotion):
         walk = self.motion.accelerate(self.moment(time, after, 0.0, 0.0)._replace(onsets=onsets)).back.walk
         for i, k in enumerate(places):
             speed, e = max(float(struck.after[i]), 0.0), float(self.restitution[k])
-            pull = -float(np.ravel(self.motion.contacts.each[k].accelerations(walk)[0])[0])
+            pull = -single(self.motion.contacts.each[k].accelerations(walk)[0])
             if pull > 0.0 and e > 0.0 and k in free:
                 low = 0.5 * speed * speed / pull < self.low[k]
                 if low or i in rebounds:
@@ -225,7 +325,7 @@ class ImpactMotion(ActiveMotion):
                     self._end(k, time, float(struck.after[i]))
             elif case is not OPEN:
                 label, rate = self.motion.contacts.labels[k], float(struck.after[i])
-                self.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
+                self.solution.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
         if self.senses:
@@ -261,28 +361,19 @@ class ImpactMotion(ActiveMotion):
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
         """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
         the nearest state in the sense of the masses."""
-        n, closed = self.layout.coordinates, self._closed()
-        at = self.moment(time, row, 0.0, 0.0)
-        for _ in range(2):
-            linear = self.rigid.linear(at)
-            shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
-            if not shut:
-                return
+        n, closed, at = self.layout.coordinates, self._closed(), self.moment(time, row, 0.0, 0.0)
+        linear = self.motion.linear(at)
+        if shut := [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]:
             row[:n] -= nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
-            at = self.moment(time, row, 0.0, 0.0)
-        if not closed:
-            return
-        if stuck := [k for k, sense in enumerate(self.senses) if sense == 0]:
-            row[n : 2 * n] = self.motion.stopped(at, stuck)
-            return
-        linear = self.rigid.linear(at)
-        sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
-        ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
-        row[n : 2 * n] -= nearest(linear.mass, ways, rates[[*closed, *sticks]])
+        if closed and (stuck := [k for k, sense in enumerate(self.senses) if sense == 0]):
+            row[n : 2 * n] = self.motion.stopped(self.moment(time, row, 0.0, 0.0), stuck)
+        elif closed:
+            still = [*closed, *(self.count + k for k in closed if self.onsets[k] == Closed(0))]
+            rates = linear.driven + linear.ways @ row[n : 2 * n]
+            row[n : 2 * n] -= nearest(linear.mass, linear.ways[still], rates[still])
 
     def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""
-        super()._end_step(solver, row)
         if not any(self.onsets):
             return
         time = float(solver.t)

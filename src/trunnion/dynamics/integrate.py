@@ -12,7 +12,7 @@ which it would break away forward and backward; see `rest`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
-from trunnion.dynamics.energy import kinetic_energy
+from trunnion.algebra.dual import single
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
-from trunnion.dynamics.rates import WORKS, Dynamics, Layout, Walks
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
+from trunnion.dynamics.start import Places
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.stiffness import shortest
 from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
@@ -75,30 +75,25 @@ class Passing(NamedTuple):
 class Integration:
     """One motion from its initial state.
 
-    bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
-    limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
-    reached; times: s, at which a load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK;
-    meetings: see `Places`; onsets, senses: how contacts and joints that may stick are, see `Moment`; start: time, s, at
-    which it begins; duration: at which it ends.
+    progress: told the share of the duration that is reached; times: s, at which a load jumps or bends; evaluations: of
+    the forces, at most, a walk counted as WALK; onsets, senses: how contacts and joints that may stick are, see
+    `Moment`; start: time, s, at which it begins; duration: at which it ends.
     """
 
     motion: FreeMotion
     dynamics: Dynamics
     duration: float
     tolerance: float
-    bends: Sequence[float] = ()
-    period: float | None = None
-    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    places: Places = field(default_factory=Places)
     progress: Callable[[float], None] | None = None
     times: Sequence[float] = ()
     evaluations: int = MOST_EVALUATIONS
-    meetings: Sequence[tuple[float, int]] = ()
     onsets: tuple[Onset, ...] = ()
     senses: tuple[int, ...] = ()
     start: float = 0.0
 
     def __post_init__(self) -> None:
-        self.layout = Layout.of(self.motion)
+        self.layout, self.bends = Layout.of(self.motion), self.places.bends
         self.solution = Solution(self.layout)
         switch_times = [time for drive in self.motion.drives.values() for time in drive.times]
         times = {time for time in (*switch_times, *self.times) if self.start < time < self.duration}
@@ -109,10 +104,9 @@ class Integration:
         self.breaks = [*sorted(times), self.duration]
         self.first_now = 0.5 * (self.start + self.breaks[0])
         self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
-        self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
-        margins = getattr(self.dynamics, "margins", Walks(self.motion).margins)
+        self.ends = np.array([self.places.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         self._walked = self.motion.walked[0]
-        self.guards = Guards(self.motion, self.layout, self.limits, margins)
+        self.guards = Guards(self.motion, self.layout, self.places.limits, self.dynamics.margins)
 
     # ---- the whole way ----------------------------------------------------------------------------------------
 
@@ -192,7 +186,7 @@ class Integration:
             if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
                 ahead = at.q + np.sign(row[n]) * self._inside(row[0])
                 second = self.dynamics(at._replace(q=ahead)).second
-                self.bends = (*self.bends, float(row[0] % self.period if self.period else row[0]))
+                self.bends = (*self.bends, float(row[0] % self.places.period if self.places.period else row[0]))
         if not np.all(np.isfinite(second)):
             cause = self._cause(start, row, sense, now) or "no_acceleration"
             if self._locked(start, row, sense, now, [cause]):
@@ -225,7 +219,8 @@ class Integration:
             self.progress(min(1.0, stretch.end / self.duration))
         spent = self.solution.asked + WALK * (self.motion.walked[0] - self._walked)
         if ended is None and spent > self.evaluations:
-            ended = self._exhausted(stretch)
+            figures = {"count": self.evaluations, "of": self.duration}
+            ended = Ended("simulate.evaluations", stretch.end, figures)
         if ended is not None:
             self.solution.ended = ended
             raise _Over
@@ -239,13 +234,6 @@ class Integration:
 
     def _measured(self, stretch: Stretch) -> None:
         """What contacts come to in a step: nothing, where there are none."""
-
-    def _exhausted(self, stretch: Stretch) -> Ended:
-        """The end where the evaluations are used up, with what makes them so many."""
-        row = stretch.state(np.array([stretch.end]))[:, 0]
-        at = self.moment(stretch.end, row, stretch.sense, stretch.now)
-        figures = shortest(self.motion, at, stretch.end - stretch.begin)
-        return Ended("simulate.evaluations", stretch.end, {"count": self.evaluations, "of": self.duration, **figures})
 
     @property
     def snapshot(self) -> Snapshot | None:
@@ -269,7 +257,7 @@ class Integration:
         def held(moments: Array) -> Array:
             rows = rest.held(time, row, moments)
             if meanwhile:
-                self.layout.works(rows)[: len(WORKS)] += meanwhile.works(moments)
+                self.layout.works(rows)[: len(WORKS)] += meanwhile(moments)
             return rows
 
         self._add(Stretch(time, end, held, 0.0, True, now, slips=self.slips))
@@ -298,7 +286,8 @@ class Integration:
             marks.append(before)
             if any(len(marks) > k and before - marks[-k] < crept * self.duration for k, crept in CREEPING):
                 return self._failed(before, row, sense, now, "")
-            near = self._near(row, between, self._next(solver, until), rate, before)
+            size = float(getattr(solver, "h_abs", None) or solver.step_size or 0.0)  # of the step that comes
+            near = self._near(row, between, min(size, until - before), rate, before)
             solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
                 return self._failed(before, row, sense, now, failed)
@@ -332,7 +321,8 @@ class Integration:
             speeds = numbers[n : 2 * n]
             numbers_asked = numbers.copy()
             if not one_way:
-                numbers_asked[:n] = self._in_range(numbers[:n])
+                if self.places.limits:  # no force may be known beyond
+                    numbers_asked[:n] = np.clip(numbers[:n], *self.ends)
             else:
                 numbers_asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
@@ -349,10 +339,6 @@ class Integration:
         if not np.isfinite(end):
             return 0.0
         return (INSIDE if self._meeting(end) is None else MEETING) * max(1.0, abs(end))
-
-    def _in_range(self, coordinates: Array) -> Array:
-        """Coordinates of which none is beyond its range, where no force may be known."""
-        return np.clip(coordinates, *self.ends) if self.limits else coordinates
 
     def _solver(
         self, rate: Callable[[float, Array], Array], begin: float, row: Array, end: float, absolute: Array,
@@ -375,11 +361,6 @@ class Integration:
             solver = self._solver(rate, begin, state, end, absolute, 0.01**k * abs(end - begin))
             failed = solver.step()
         return solver, failed
-
-    @staticmethod
-    def _next(solver: OdeSolver, until: float) -> float:
-        """How far the next step is about to go, s."""
-        return min(float(getattr(solver, "h_abs", None) or solver.step_size or 0.0), until - float(solver.t))
 
     def _near(
         self, row: Array, between: tuple[float, float], step: float, rate: Callable[[float, Array], Array], time: float
@@ -481,9 +462,9 @@ class Integration:
 
     def _meeting(self, coordinate: float) -> int | None:
         """The module of which two assemblies meet at a bend, if they do."""
-        for meeting, module in self.meetings:
-            apart = coordinate - meeting
-            apart -= self.period * round(apart / self.period) if self.period and np.isfinite(apart) else 0.0
+        for meeting, module in self.places.meetings:
+            apart, period = coordinate - meeting, self.places.period
+            apart -= period * round(apart / period) if period and np.isfinite(apart) else 0.0
             if abs(apart) < NEAR * max(1.0, abs(coordinate)):
                 return module
         return None
@@ -504,8 +485,7 @@ class Integration:
     def _absolute(self, row: Array) -> Array:
         """Absolute tolerances: a share of what is typical of each number."""
         n, system = self.layout.coordinates, self.motion.system
-        size = float(np.ravel(system.size(self.motion.values))[0])
-        sizes = np.array([1.0 if system.turns(name) else size for name in self.motion.names])
+        sizes = np.array([1.0 if system.turns(name) else self.motion.size for name in self.motion.names])
         tolerances = np.full(len(row), self.tolerance)
         tolerances[:n] *= 0.01 * sizes
         tolerances[n : 2 * n] *= 0.01 * self.pace
@@ -524,7 +504,7 @@ class Integration:
         bends = np.asarray(self.bends, float)
         low, high = (float(end) for end in self.ends[:, 0])
         if len(bends):
-            period = 0.0 if self.period is None else self.period
+            period = self.places.period or 0.0
             laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else [0.0]
             every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
             near = 1e-12 * max(1.0, abs(q))
@@ -573,9 +553,9 @@ class Integration:
         return True
 
     def _compare(self, time: float, row: Array, sense: float, now: float) -> None:
-        """Tell where one free coordinate has several accelerations, every few steps: E − T, which is continuous, has
-        other roots than that which is followed where it falls far out."""
-        if self.motion.affine or len(self.motion.names) != 1 or SEVERAL in self.solution.notes:
+        """Tell where there are several accelerations, every few steps: E − T, which is continuous, has other roots than
+        that which is followed where its determinant changes its sign far out."""
+        if self.motion.affine or 0 in self.senses or SEVERAL in self.solution.notes:
             return
         self._doubts += 1
         if self._doubts % LOOKED == 1 and np.any(self.motion.growth(self.moment(time, row, sense, now)) < 0.0):
@@ -621,4 +601,4 @@ class Integration:
 
     def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
         at = self.moment(time, row, sense, now)
-        return float(np.ravel(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))[0])
+        return single(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))

@@ -5,13 +5,13 @@ They have no course over a cycle. Of dual numbers the derivatives are central di
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.compiled_rates import Codes, rates_of
 from trunnion.dynamics.prepared import CYCLES, integration_of
@@ -66,24 +66,36 @@ def courses_in_time(
     return by_measure
 
 
+@np.errstate(all="ignore")
 def numbers_in_time(
     run: Run, driver: str, duration: float | None, values: Mapping[str, Number], shape: tuple[int, ...]
 ) -> dict[str, Number]:
     """What `figures_in_time` tells, one number a sample, with derivatives where values are dual."""
     count = shape[0] if len(shape) == 2 else 1
-    dual = {path: value for path, value in values.items() if isinstance(value, Dual)}
-    numbers_each = {path: _column(primal(value), count) for path, value in values.items()}
     column = (count, 1) if len(shape) == 2 else (1,)
-    if not dual:
-        return {
-            name: figure.reshape(column) for name, figure in _known(run, driver, numbers_each, count, duration).items()
-        }
-    slopes = {path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1)) for path, value in dual.items()}
+    plain = {path: _column(primal(value), count) for path, value in values.items()}
+    slopes = {
+        path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1))
+        for path, value in values.items()
+        if isinstance(value, Dual)
+    }
+    if not slopes:
+        figures = _known(run, driver, plain, count, duration)
+        return {name: figure.reshape(column) for name, figure in figures.items()}
     step = step_of(run, values, count)
     moved = np.flatnonzero(np.any(np.array(list(slopes.values())) != 0.0, axis=(0, 2)))
-    tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in numbers_each.items()}
+
+    def tried(value: Number, slope: Array | None) -> Number:
+        """A number of every row, and of those moved up and down."""
+        if slope is None and not np.ndim(value):
+            return value
+        full = np.broadcast_to(value, step.shape)
+        change = 0.0 if slope is None else (slope * step)[moved]
+        return np.concatenate([full, full[moved] + change, full[moved] - change])
+
+    rows = {path: tried(value, slopes.get(path)) for path, value in plain.items()}
     numbers: dict[str, Number] = {}
-    for name, figure in _known(run, driver, tried, count + 2 * len(moved), duration).items():
+    for name, figure in _known(run, driver, rows, count + 2 * len(moved), duration).items():
         change = np.zeros(count)
         above, below = figure[count:].reshape(2, len(moved))
         change[moved] = (above - below) / (2.0 * np.ravel(step[moved]))
@@ -107,21 +119,7 @@ def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, dura
 
 def _column(value: Number, count: int) -> Number:
     """A number of every sample, (sample, 1), or of all."""
-    if not np.ndim(value):
-        return value
-    return np.broadcast_to(np.asarray(value, float), (count, 1)) if np.size(value) > 1 else float(np.ravel(value)[0])
-
-
-def _tried(value: Number, slope: Array | None, step: Array, moved: NDArray[np.intp]) -> Number:
-    """A number of every row, and of those moved up and down."""
-    if slope is None and not np.ndim(value):
-        return value
-    full = np.broadcast_to(value, step.shape)
-    change = np.zeros_like(full[moved]) if slope is None else (slope * step)[moved]
-    return np.concatenate([full, full[moved] + change, full[moved] - change])
-
-
-# ---- motions one after another ----------------------------------------------------------------------------------
+    return np.broadcast_to(np.asarray(value, float), (count, 1)) if np.size(value) > 1 else single(value)
 
 
 @np.errstate(all="ignore")
@@ -131,31 +129,26 @@ def figures_in_time(
     """Every figure of `started.FIGURES` of a free driver, (sample,); NaN of a motion that has none.
 
     values: of the mechanism, (sample, 1) where they vary; duration: s, ten cycles of the stated motion if not given.
-    A motion that ends before its time, because it can go no farther, has no figures.
+    A motion that cannot begin, or that ends before its time because it can go no farther, has no figures.
     """
     duration = CYCLES * run.cycle.duration if duration is None else duration
     varied = frozenset(path for path, value in values.items() if np.ndim(value) == 2)
+    codes: Codes = run.once("machine code of motions", dict)
     figures = {name: np.full(count, np.nan) for name in FIGURES}
     for i in range(count):
         alone = {path: float(value[i, 0]) if path in varied else value for path, value in values.items()}
-        for name, figure in _alone(run, driver, alone, duration, tolerance, varied).items():
-            figures[name][i] = figure
+        try:
+            motion = FreeMotion.of(Run(run.system, alone, run.system.cycle(alone), run.chosen))
+            load_places, row = places(motion), initial_row(motion)
+            limits = load_places.limits.items()
+            if any(not low <= row[motion.names.index(name)] <= high for name, (low, high) in limits):
+                continue
+            rates = rates_of(motion, codes, varied)
+            solution = integration_of(motion, rates, load_places, duration, tolerance).run(row)
+        except MechanismError:
+            continue
+        if solution.ended is None and solution.stretches:
+            course = DriveCourse.of(motion, solution, motion.names.index(driver))
+            for name, figure in course.figures().items():
+                figures[name][i] = figure
     return figures
-
-
-def _alone(
-    run: Run, driver: str, values: Mapping[str, Any], duration: float, tolerance: float, varied: Collection[str]
-) -> dict[str, float]:
-    """The figures of one motion; none where it cannot begin or ends before its time."""
-    codes: Codes = run.once("machine code of motions", dict)
-    try:
-        motion = FreeMotion.of(Run(run.system, values, run.system.cycle(values), run.chosen))
-        load_places, row = places(motion), initial_row(motion)
-        if not load_places.limits[0] <= row[0] <= load_places.limits[1]:
-            return {}
-        solution = integration_of(motion, rates_of(motion, codes, varied), load_places, duration, tolerance).run(row)
-    except MechanismError:
-        return {}
-    if solution.ended is not None or not solution.stretches:
-        return {}
-    return DriveCourse.of(motion, solution, motion.names.index(driver)).figures()

@@ -4,23 +4,28 @@ A pin in play takes no freedom away. Without its joint the linkage has more coor
 space, or four where the pin slides. They are coordinates of joints that remain, in the loop of the joint, chosen so
 that the modules become as small as can be. A link that no joint holds any more has the place of its mass centre and
 its turn for coordinates, by joints to the ground that carry nothing. In space a driver cannot move all freedoms of a
-ball or a cylinder: such joints in the loop become chains of single turns and slides (`dynamics.chains`). So motion in
+ball or a cylinder: such joints in the loop become chains of single turns and slides. So motion in
 time needs nothing new for play: the offset of a pin in its hole follows from the coordinates.
+
+Every freedom of a chain is a coordinate that a driver can move. Its joints carry nothing but what the joint itself
+carried. All are counted from the pose at the start, about axes at right angles to each other there. Three turns leave a
+direction in which the links cannot turn where the third axis lies along the first: the axes are chosen so that this is
+as far as can be from all poses of the cycle.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import flat
-from trunnion.dynamics.chains import Chain, chain_of_joint, hanging_chain
+from trunnion.algebra.dual import primal, single
+from trunnion.algebra.nested import each, flat
+from trunnion.algebra.space import moment_at
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
@@ -29,25 +34,27 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import Numbers
 from trunnion.model.parts import Driver
-from trunnion.solve.forward import Forward
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.run import Run
 from trunnion.structure.decompose import decompose, mobility_by_formula
 from trunnion.structure.passive import passive
 
-__all__ = ["Opened", "in_play", "is_rigid", "of_several", "opened"]
+__all__ = ["Opened", "in_play", "of_several", "opened"]
 
 Array = NDArray[np.float64]
+
 
 KEPT = (
     "trunnion", "name", "space", "gravity", "dimensions", "links", "ground", "joints", "joint_defaults", "drivers",
     "loads", "tables", "springs", "gears", "assembly", "errors", "fits",
 )  # fmt: skip
-PARTS = ("x", "y", "turn")  # of the way to the ground of a link that no joint holds
 MOST_CHOICES = 5000
 BESIDE = 0.1  # of the size
-SHARE = (
-    1e-3  # of a radian or of the size: how far the stated motion of a coordinate that is freed goes, which is not it
-)
+SHARE = 1e-3  # of a radian or of the size: how far a coordinate that is freed is stated to go, which it does not
+LOOKS = 73  # poses of the cycle at which axes of three turns are tried
+MEETING = 0.99  # cosine of the angle of first and third axis: nearer they are as good as one
+ANGLES = 24  # of the third axis about the first, and directions of the first beside those of the motion
+Starts = dict[str, tuple[float, float]]  # coordinates and their rates at the start, by joint
 
 
 @dataclass(frozen=True)
@@ -65,132 +72,50 @@ def in_play(mechanism: Mechanism) -> list[str]:
     return [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
 
 
-def is_rigid(mechanism: Mechanism) -> bool:
-    """Whether the joints in play are between bodies that do not give."""
-    return any(joint.contact.of.rigid for joint in mechanism.effective_joints.values() if joint.contact is not None)
-
-
 def opened(run: Run) -> Opened:
     """A prepared mechanism without its joints in play. It begins with every pin in the middle of its hole, with the
     velocities of the linkage without play."""
     mechanism, cut = run.system.mechanism, in_play(run.system.mechanism)
-    walk, spatial = _start(run), mechanism.space == "spatial"
+    walk = _start(run)
     if not all(np.all(np.isfinite(number)) for motion in walk.motions.values() for number in flat(motion[:2])):
         what = "the mechanism without play has no position at its start, from which the motion is to begin"
         raise MechanismError(Finding(what, "drivers", "begin at another coordinate: initial: {coordinate: …}"))
     data = {key: part for key, part in mechanism.data().items() if key in KEPT}
     several = of_several(mechanism)
     _leave_out(data, mechanism, [*cut, *several])
-    coordinates, parts = dict[str, tuple[float, float]](), dict[str, tuple[str, ...]]()
-    for joint in several:
-        chain = chain_of_joint(run, walk, joint)
-        _put(data, mechanism.effective_joints[joint].links, chain)
-        coordinates.update(chain.coordinates)
-        parts[joint] = tuple(chain.joints)
-    single = list(coordinates)
+    chains = {joint: _chain_of_joint(data, run, walk, joint) for joint in several}
+    hung: Starts = {}
     for link in _loose(data, mechanism):
-        if spatial:
-            chain = hanging_chain(run, walk, link)
-            _put(data, (mechanism.fixed_link, link), chain)
-            coordinates.update(chain.coordinates)
-        else:
-            coordinates.update(_hang(data, mechanism.fixed_link, link, walk))
+        hung |= (_hang_in_space if run.system.spatial else _hang)(data, run, walk, link)
     base = Mechanism(**data)
-    hung = [name for name in coordinates if name not in single]
     missing = mobility_by_formula(base) - len(passive(base)) - len(base.drivers) - len(hung)
-    chosen = _chosen(base, hung, max(missing, 0), cut, run)
-    by_joint = {name: coordinates.get(name) or _coordinate(walk, name) for name in (*hung, *chosen)}
-    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, by_joint)}
-    return Opened(Mechanism(**data), run, parts)
+    starts = {name: start for chain in chains.values() for name, start in chain.items()} | hung
+    for name in _chosen(base, list(hung), max(missing, 0), cut, run):
+        if name not in starts:
+            which = 0 if run.system.turns(name) else 1
+            starts[name] = single(walk.coordinates(name)[which]), single(walk.rates(name)[which])
+        hung[name] = starts[name]
+    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, hung)}
+    return Opened(Mechanism(**data), run, {joint: tuple(chain) for joint, chain in chains.items()})
 
 
 def _leave_out(data: dict[str, Any], mechanism: Mechanism, without: Sequence[str]) -> None:
     """Take joints out of what a file says."""
+    paths = tuple(f"joints.{name}." for name in without)
     data["joints"] = {name: entry for name, entry in data["joints"].items() if name not in without}
     data["assembly"] = {name: entry for name, entry in data.get("assembly", {}).items() if name not in without}
     errors = data.get("errors", {}).items()
-    data["errors"] = {name: entry for name, entry in errors if not _of(mechanism.path_of(name), without)}
+    data["errors"] = {name: entry for name, entry in errors if not mechanism.path_of(name).startswith(paths)}
     data["links"] = {name: {**entry, "points": dict(entry["points"])} for name, entry in data["links"].items()}
-
-
-def _of(path: str, joints: Sequence[str]) -> bool:
-    """Whether a number is one of these joints."""
-    return any(path.startswith(f"joints.{name}.") for name in joints)
 
 
 def _start(run: Run) -> Forward:
     """The walk of the mechanism as stated at the start, with the stated initial motion of its free drivers."""
-    names = [name for name, driver in run.system.mechanism.drivers.items() if driver.found]
-    if not names:
+    if not any(driver.found for driver in run.system.mechanism.drivers.values()):
         return run.walk(np.zeros(1))
     motion = FreeMotion.of(run)
-    row = initial_row(motion)[:, None]
-    at = Layout.of(motion).moment(np.zeros(1), row)
+    at = Layout.of(motion).moment(np.zeros(1), initial_row(motion)[:, None])
     return motion.walk(at, np.zeros_like(at.q))
-
-
-def _number(value: object) -> float:
-    return float(np.ravel(primal(value))[0])
-
-
-def _coordinate(walk: Forward, joint: str) -> tuple[float, float]:
-    """Coordinate of a joint and its rate at the start."""
-    which = 0 if walk.system.turns(joint) else 1
-    return _number(walk.coordinates(joint)[which]), _number(walk.rates(joint)[which])
-
-
-# ---- links that no joint holds --------------------------------------------------------------------------------
-
-
-def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
-    """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
-    part = {link: {link} for link in data["links"]}
-    for joint in data["joints"].values():
-        first, other = (part[link] for link in joint["links"])
-        if first is not other:
-            first |= other
-            part.update(dict.fromkeys(other, first))
-    ground = part[mechanism.fixed_link]
-    others = {id(links): links for links in part.values() if links is not ground}
-    mass = mechanism.parameters()
-    return [
-        max((link for link in mechanism.links if link in links), key=lambda link: mass[f"links.{link}.mass"])
-        for links in others.values()
-    ]
-
-
-def _hang(data: dict[str, Any], ground: str, link: str, walk: Forward) -> dict[str, tuple[float, float]]:
-    """Connect a loose link with the ground by slides along x and y and a turn; their coordinates and rates."""
-    along, across, turn = names = [f"{link}_in_play_{part}" for part in PARTS]
-    carriers = [f"{along}_carrier", f"{across}_carrier"]
-    place = _turning_point(data, link, walk)
-    links = data["links"]
-    x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
-    links[ground]["points"][along] = x
-    links[carriers[0]] = {"points": {along: x, across: y}}
-    links[carriers[1]] = {"points": {across: y, turn: [0, 0]}}
-    links[link]["points"][turn] = list(place)
-    ends = ([ground, carriers[0]], carriers, [carriers[1], link])
-    for name, kind, pair in zip(names, ("prismatic", "prismatic", "revolute"), ends, strict=True):
-        data["joints"][name] = {"type": kind, "links": pair, "friction": 0, "seat": "free"}
-    at, frame, twist = walk.at(link, place), walk.motions[link].frame, walk.motions[link].twist
-    angle = np.arctan2(_number(frame.s), _number(frame.c))
-    return {
-        along: (_number(at.place[0]), _number(at.velocity[0])),
-        across: (_number(at.place[1]), _number(at.velocity[1])),
-        turn: (float(angle), _number(twist.w)),
-    }
-
-
-def _turning_point(data: Mapping[str, Any], link: str, walk: Forward) -> tuple[float, ...]:
-    """The mass centre of a link; beside it where a joint is, for two that turn at one point move nothing."""
-    x, y = (_number(part) for part in walk.system.centre(walk.values, link))
-    joints = [name for name, joint in data["joints"].items() if link in joint["links"]]
-    places = {tuple(_number(walk.values[f"links.{link}.points.{name}.{axis}"]) for axis in "xy") for name in joints}
-    return (x + BESIDE * _number(walk.system.size(walk.values)) if (x, y) in places else x), y
-
-
-# ---- chains in space ------------------------------------------------------------------------------------------
 
 
 def of_several(mechanism: Mechanism) -> list[str]:
@@ -202,25 +127,51 @@ def of_several(mechanism: Mechanism) -> list[str]:
     return [name for name in joints if name in nearby and PAIRS[joints[name].type].count > 1]
 
 
-def _put(data: dict[str, Any], links: tuple[str, str], chain: Chain) -> None:
-    """Put a chain between two links."""
-    for link, points in zip(links, chain.points, strict=True):
-        data["links"][link]["points"].update(points)
-    data["links"].update(chain.links)
-    data["joints"].update(chain.joints)
+# ---- links and joints -----------------------------------------------------------------------------------------
 
 
-# ---- coordinates ----------------------------------------------------------------------------------------------
+def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
+    """Joints on the shortest ways around the joints that are cut."""
+    edges = {name: joint.links for name, joint in mechanism.effective_joints.items() if name not in cut}
+    nearby = set[str]()
+    for cut_joint in cut:
+        first, last = mechanism.effective_joints[cut_joint].links
+        came, ahead = dict[str, tuple[str, str]](), [first]
+        for link in ahead:
+            for name, (one_end, other_end) in edges.items():
+                farther = other_end if link == one_end else one_end if link == other_end else first
+                if farther != first and farther not in came:
+                    came[farther] = name, link
+                    ahead.append(farther)
+        while last in came:
+            name, last = came[last]
+            nearby.add(name)
+    return nearby
+
+
+def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
+    """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
+    part, mass = {link: {link} for link in data["links"]}, mechanism.parameters()
+    for joint in data["joints"].values():
+        first, other = (part[link] for link in joint["links"])
+        if first is not other:
+            first |= other
+            part.update(dict.fromkeys(other, first))
+    loose = {id(links): links for links in part.values() if mechanism.fixed_link not in links}
+    return [
+        max((link for link in mechanism.links if link in links), key=lambda link: mass[f"links.{link}.mass"])
+        for links in loose.values()
+    ]
 
 
 def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], run: Run) -> tuple[str, ...]:
     """The joints whose coordinates become free: with them every module is as small as can be."""
+    nearby = _loop(run.system.mechanism, cut)
     joints = [
         name
         for name, joint in base.effective_joints.items()
         if name not in base.drivers and name not in hung and PAIRS[joint.type].drivable
     ]
-    nearby = _loop(run.system.mechanism, cut)
     joints.sort(key=lambda name: name not in nearby)
     best: tuple[tuple[int, int], tuple[str, ...]] | None = None
     for tried in itertools.islice(itertools.combinations(joints, count), MOST_CHOICES):
@@ -241,38 +192,12 @@ def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], ru
     return best[1]
 
 
-def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
-    """Joints on the shortest ways around the joints that are cut."""
-    links_of_loop: set[str] = set()
-    for name in cut:
-        first, second = mechanism.effective_joints[name].links
-        links_of_loop.update(_way(mechanism, first, second, set(cut)))
-    return links_of_loop
-
-
-def _way(mechanism: Mechanism, first: str, second: str, without: set[str]) -> Iterator[str]:
-    """Joints on the shortest way from a link to another."""
-    came: dict[str, tuple[str, str] | None] = {first: None}
-    front = [first]
-    while front and second not in came:
-        ahead: list[str] = []
-        for name, joint in mechanism.effective_joints.items():
-            for here, next_link in (joint.links, joint.links[::-1]):
-                if name not in without and here in front and next_link not in came:
-                    came[next_link] = (name, here)
-                    ahead.append(next_link)
-        front = ahead
-    while (step := came.get(second)) is not None:
-        yield step[0]
-        second = step[1]
-
-
 def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, Any]]:
     """Free drivers of the coordinates, from where they are at the start.
 
     What they are stated to do otherwise is next to nothing, in the time of one cycle: it chooses the assembly there.
     """
-    size, duration = _number(run.system.size(run.values)), run.cycle.duration or 1.0
+    size, duration = single(run.system.size(run.values)), run.cycle.duration or 1.0
     drivers_made: dict[str, dict[str, Any]] = {}
     for name, (coordinate, rate) in coordinates.items():
         span = SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size)
@@ -283,3 +208,130 @@ def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, f
             "initial": {"coordinate": coordinate, "speed": rate},
         }
     return drivers_made
+
+
+# ---- chains ---------------------------------------------------------------------------------------------------
+
+
+def _chained(
+    data: dict[str, Any], name: str, links: tuple[str, str], kinds: str, ends: tuple[Any, Any], inside: Sequence[Any],
+    starts: Sequence[tuple[float, float]],
+) -> Starts:  # fmt: skip
+    """Put a chain of turns and slides between two links. kinds: of its joints, R or P; ends: its points on the first
+    and on the last link; inside: points of its joints on the links between; starts: coordinates and rates."""
+    names = [f"{name}_in_play_{k}" for k in range(1, len(kinds) + 1)]
+    row = [links[0], *(f"{joint}_carrier" for joint in names[:-1]), links[1]]
+    for link in row[1:-1]:
+        data["links"][link] = {"points": {}}
+    for k, (joint, kind) in enumerate(zip(names, kinds, strict=True)):
+        pair = {"R": "revolute", "P": "prismatic"}[kind]
+        data["joints"][joint] = {"type": pair, "links": row[k : k + 2], "friction": 0, "seat": "free"}
+        first = ends[0] if k == 0 else inside[k]
+        last = ends[1] if k == len(kinds) - 1 else inside[k]
+        data["links"][row[k]]["points"][joint], data["links"][row[k + 1]]["points"][joint] = first, last
+    return dict(zip(names, starts, strict=True))
+
+
+def _hang(data: dict[str, Any], run: Run, walk: Forward, link: str) -> Starts:
+    """Connect a loose link with the ground by slides along x and y and a turn about its mass centre; beside it where a
+    joint is, for two that turn at one point move nothing."""
+    x, y = (single(part) for part in run.system.centre(walk.values, link))
+    joints = [name for name, joint in data["joints"].items() if link in joint["links"]]
+    if (x, y) in {tuple(single(walk.values[f"links.{link}.points.{name}.{axis}"]) for axis in "xy") for name in joints}:
+        x += BESIDE * single(run.system.size(walk.values))
+    at, (frame, twist, *_) = walk.at(link, (x, y)), walk.motions[link]
+    inside = [{"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}, [0, 0]]
+    starts = [(single(place), single(speed)) for place, speed in zip(at.place[:2], at.velocity[:2], strict=True)]
+    starts.append((float(np.arctan2(single(frame.s), single(frame.c))), single(twist.w)))
+    links = run.system.mechanism.fixed_link, link
+    return _chained(data, link, links, "PPR", (inside[0], [x, y]), inside, starts)
+
+
+def _hang_in_space(data: dict[str, Any], run: Run, walk: Forward, link: str) -> Starts:
+    """Connect a loose link with the ground by three slides of its mass centre and three turns."""
+    ground = run.system.mechanism.fixed_link
+    centre = walk.at(link, run.system.centre(walk.values, link)).place
+    return _counted(data, walk, link, (ground, link), "PPPRRR", _turning(run, walk, ground, link), centre)
+
+
+def _chain_of_joint(data: dict[str, Any], run: Run, walk: Forward, joint: str) -> Starts:
+    """Single slides and turns for a joint of several freedoms. walk: at the start."""
+    assert isinstance(walk, SpatialWalk)
+    kind, links = run.system.joints[joint]
+    first, second = (each(element, single) for element in walk.ends(joint))
+    if kind == "cylindrical":  # it keeps its elements, and with them its turn and its slide
+        motion = zip(walk.coordinates(joint), walk.rates(joint), strict=True)
+        starts = [(single(place), single(rate)) for place, rate in motion]
+        local = [each(walk.local[link, joint], single) for link in links]
+        at = [_point(np.array(frame.place), np.array(frame.z), np.array(frame.x)) for frame in local]
+        along = _point(np.zeros(3), *np.eye(3)[[2, 0]])
+        return _chained(data, joint, links, "RP", (at[0], at[1]), [along, along], starts)
+    if kind == "universal":
+        kinds, basis = "RR", np.array([first.z, second.z, np.cross(first.z, second.z)])
+    elif kind == "planar":
+        kinds, basis = "PPR", np.array([second.x, second.y, second.z])
+    else:
+        kinds, basis = "RRR", _turning(run, walk, *links)
+    return _counted(data, walk, joint, links, kinds, basis, second.place)
+
+
+def _counted(
+    data: dict[str, Any], walk: Forward, name: str, links: tuple[str, str], kinds: str, basis: Array,
+    place: Sequence[Any],
+) -> Starts:  # fmt: skip
+    """A chain whose coordinates are 0 at the start, along and about the rows of `basis`, from a place, m."""
+    order = [kinds[:k].count(kind) if kinds != "PPR" or kind == "P" else 2 for k, kind in enumerate(kinds)]
+    at = np.array([single(part) for part in place])
+    frames = [each(walk.motions[link].frame, single) for link in links]
+    twists = [each(walk.motions[link].twist, single) for link in links]
+    spin = np.subtract(twists[1].u, twists[0].u)
+    speed = np.subtract(moment_at(twists[1], tuple(at)), moment_at(twists[0], tuple(at)))
+    starts = [(0.0, float(basis[i] @ (spin if kind == "R" else speed))) for i, kind in zip(order, kinds, strict=True)]
+    ends, sides = [], np.eye(3)
+    for frame, i in zip(frames, (order[0], order[-1]), strict=True):
+        axes = np.array(frame[:3])  # rows: axes of the link
+        ends.append(_point(axes @ (at - np.array(frame.place)), axes @ basis[i], axes @ basis[(i + 1) % 3]))
+    inside = [_point(np.zeros(3), sides[i], sides[(i + 1) % 3]) for i in order]
+    return _chained(data, name, links, kinds, (ends[0], ends[1]), inside, starts)
+
+
+def _point(at: Array, axis: Array, x: Array) -> dict[str, Any]:
+    return {"at": at.tolist(), "axis": axis.tolist(), "x": x.tolist()}
+
+
+def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
+    """Rows: three axes at right angles at the start, of which first and last keep apart over the cycle."""
+    start = _relative(walk, first, second)[0]
+    moving = _relative(run.walk(np.linspace(0.0, run.cycle.duration, LOOKS)), first, second)
+    # as the first link sees it
+    turned = np.array([rotation @ start.T for rotation in (start, *moving) if np.all(np.isfinite(rotation))])
+    home = np.array(each(walk.motions[first].frame, single)[:3]).T
+    halves = np.array([[turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]] for turn in turned])
+    best, least = np.eye(3), np.inf
+    # about which the links turn most, then those of the first link
+    for axis in (*np.linalg.eigh(halves.T @ halves)[1].T[::-1], *np.eye(3)):
+        rotation = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        rotation /= np.linalg.norm(rotation)
+        other = np.cross(axis, rotation)
+        for angle in np.arange(ANGLES) * np.pi / ANGLES:
+            last = np.cos(angle) * rotation + np.sin(angle) * other
+            near = float(np.max(np.abs(axis @ turned @ last)))
+            if near < least - 1e-9:
+                best, least = np.array([axis, np.cross(last, axis), last]), near
+    if least > MEETING:
+        what = f"{second} turns so far against {first} that no three axes of its turns keep apart over the cycle"
+        remedy = "let fewer joints of this link be in play, or it turn less"
+        raise MechanismError(Finding(what, f"links.{second}", remedy))
+    axes: Array = best @ home.T
+    return axes
+
+
+def _relative(walk: Forward, first: str, second: str) -> Array:
+    """How the second link is turned as the first sees it, (time, row, column)."""
+    first_axis, other = (
+        np.array([[np.broadcast_to(primal(part), np.shape(walk.time)).ravel() for part in axis]
+                  for axis in walk.motions[link].frame[:3]])
+        for link in (first, second)
+    )  # fmt: skip
+    products: Array = np.einsum("art,brt->tab", first_axis, other)  # axis of the first, of the second
+    return products

@@ -1,38 +1,28 @@
-"""Rates of everything that is integrated in time, and how it stands in one row of numbers."""
+"""Rates of everything that is integrated in time, how it stands in one row of numbers, and the energy of a motion."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.state import FreeMotion, Linear, Moment
-from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Closed, Contacts
 from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.system import law_of, law_parameters
 
 __all__ = [
-    "CLUTCH",
-    "CONTACT",
-    "WORKS",
-    "Dynamics",
-    "Layout",
-    "Rates",
-    "Rigid",
-    "Seeing",
-    "Seen",
-    "Walks",
-    "bristle_rates",
-    "powers_of",
-    "seen_of",
-    "works_of",
-]
+    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "kinetic_energy",
+    "potential_energy", "works_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
+
 
 # what is integrated to make the books: by the drivers (freed or not), loads and springs into the mechanism, to
 # friction, and of joints in play to the contacts
@@ -56,12 +46,6 @@ class Rates(NamedTuple):
     slip: Array = np.empty(0)
 
 
-class Dynamics(Protocol):
-    """What tells the rates at one moment."""
-
-    def __call__(self, at: Moment) -> Rates: ...
-
-
 class Seen(NamedTuple):
     """Of every contact, (contact, lane): gap, m, its rate and slip, m/s, normal force and friction, N."""
 
@@ -72,23 +56,17 @@ class Seen(NamedTuple):
     friction: Array
 
 
-class Seeing(Dynamics, Protocol):
-    """What also tells, of several coordinates, the derivative of a row and how the contacts are in many lanes."""
+class Dynamics(Protocol):
+    """What tells how a motion goes on: the rates at one moment and, of many lanes, the accelerations, (coordinate,
+    lane), the contacts, and 1/condition of the modules of `FreeMotion.meeting`, (module, lane)."""
 
-    def derivative(
-        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
-    ) -> Array: ...
+    def __call__(self, at: Moment) -> Rates: ...
+
+    def seconds(self, at: Moment) -> Array: ...
 
     def look(self, at: Moment) -> Seen: ...
 
-
-class Rigid(Seeing, Protocol):
-    """What also tells the contacts with their forces while some stay closed, in many lanes, and what impulses come
-    to."""
-
-    def touches(self, at: Moment) -> Seen: ...
-
-    def linear(self, at: Moment) -> Linear: ...
+    def margins(self, at: Moment) -> Array: ...
 
 
 class Layout(NamedTuple):
@@ -133,6 +111,11 @@ class Layout(NamedTuple):
         """The works, (work, lane)."""
         return rows[self.slip + self.clutched :]
 
+    def rates(self, numbers: Array, sound: bool = True, locked: bool = False) -> Rates:
+        """Rates from second derivatives and what `beside` tells, one after the other."""
+        n, memory = self.coordinates, 2 * self.coordinates + self.bristles
+        return Rates(numbers[:n], numbers[n : 2 * n], numbers[2 * n : memory], numbers[memory:], sound, locked)
+
     def row(self, rate: Array, rates: Rates) -> Array:
         """The derivative of a row."""
         return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.slip, rates.works])
@@ -147,102 +130,101 @@ class Walks:
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
-        motion, n = self.motion, self.layout.coordinates
+        motion = self.motion
         if not (np.all(np.isfinite(at.q)) and np.all(np.isfinite(at.rate))):  # of a step one of whose rates is unknown
-            unknown = np.full(2 * n + len(at.bristles) + len(self.layout.works_named), np.nan)
-            second, integral, bristles, works = np.split(unknown, [n, 2 * n, 2 * n + len(at.bristles)])
-            return Rates(second, integral, bristles, works, False)
+            return self.layout.rates(np.full(self.layout.size - self.layout.coordinates, np.nan), False)
         accelerated = motion.accelerate(at, self._last)
         if self._last is not None and not np.all(accelerated.converged & ~accelerated.turned):
-            accelerated = motion.accelerate(
-                at
-            )  # the last ones may lie on the wrong side of where a reaction turns round
+            accelerated = motion.accelerate(at)  # the last may lie on the wrong side of where a reaction turns round
         if np.all(np.isfinite(accelerated.second)):
             self._last = accelerated.second
-        integral = np.array([
-            drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(motion.drives.values())
-        ]).reshape(at.q.shape)  # fmt: skip
         sound = bool(np.all(accelerated.converged & ~accelerated.turned))
         locked = any(bool(np.any(np.less(settled.share, 1.0))) for settled in accelerated.back.settled)
-        memory = _of_one_lane(bristle_rates(motion, at, accelerated.back))
-        works = _of_one_lane(works_of(accelerated.back, at._replace(onsets=accelerated.onsets), motion.contacts))
-        return Rates(accelerated.second[:, 0], integral[:, 0], memory, works, sound, locked)
+        others = beside(motion, at._replace(onsets=accelerated.onsets), accelerated.back)
+        numbers = np.array([*accelerated.second[:, 0], *map(single, others)])
+        return self.layout.rates(numbers, sound, locked)
 
     def seconds(self, at: Moment) -> Array:
-        """The accelerations, (coordinate, lane)."""
+        """See `Dynamics`."""
         return self.motion.accelerate(at).second
 
     def margins(self, at: Moment) -> Array:
-        """See `FreeMotion.margins`, (module, lane)."""
+        """See `Dynamics`."""
         with np.errstate(all="ignore"):
             walk = self.motion.walk(at, np.zeros_like(at.q))
             return np.array([np.broadcast_to(margin, at.q.shape[1]) for margin in self.motion.margins(walk)])
 
     def look(self, at: Moment) -> Seen:
-        """See `Seeing`."""
-        motion = self.motion
-        pushes = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
-        return seen_of(pushes, at.q.shape[1])
-
-    def derivative(
-        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
-    ) -> Array:
-        """The derivative of a row; NaN for no answer."""
-        n = self.layout.coordinates
-        at = self.layout.moment(np.array([time]), row[:, None], now=now)
-        with np.errstate(all="ignore"):
-            rates = self(at._replace(onsets=tuple(onsets), senses=senses))
-        return self.layout.row(row[n : 2 * n], rates) if rates.sound else np.full(len(row), np.nan)
-
-    def touches(self, at: Moment) -> Seen:
-        """See `Rigid`."""
-        solved = self.motion.accelerate(at)
-        return seen_of(self.motion.contacts.pushes(solved.back.walk, solved.onsets), at.q.shape[1])
-
-    def linear(self, at: Moment) -> Linear:
-        """See `Rigid`."""
-        return self.motion.linear(at)
+        """See `Dynamics`."""
+        motion, onsets, lanes = self.motion, at.onsets, at.q.shape[1]
+        if any(isinstance(onset, Closed) for onset in onsets):
+            accelerated = motion.accelerate(at)
+            walk, onsets = accelerated.back.walk, accelerated.onsets
+        else:
+            walk = motion.walk(at, np.zeros_like(at.q))
+        parts = [(state.gap, state.rate, state.slip, push.normal, push.friction)
+                 for state, push in motion.contacts.pushes(walk, onsets)]  # fmt: skip
+        return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
 
 
-def seen_of(pushes: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
-    """Of contacts at many moments what is looked at."""
-    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
-    return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
-
-
-def _of_one_lane(numbers: Sequence[Number]) -> Array:
-    return np.array([float(np.ravel(primal(number))[0]) for number in numbers])
-
-
-def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
-    """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
-    powers = _powers(back)
-    if contacts.each:
-        powers.append(sum((push.loss for _, push in contacts.pushes(back.walk, at.onsets)), 0.0))
-    return powers
-
-
-def powers_of(back: Backward, lanes: int) -> Array:
-    """Power of the drivers, loads and springs into the mechanism, and to friction, W; (work, lane)."""
-    return np.array([np.broadcast_to(primal(power), lanes) for power in _powers(back)], float)
-
-
-def _powers(back: Backward) -> list[Number]:
-    loads = back.walk.system.mechanism.loads
-    return [
-        sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
-        sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
-        sum((state.power for state in back.springs.values()), 0.0),
-        sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
-    ]
-
-
-def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
-    """ż = v − d(v) z of every contact with a memory, m/s."""
-    rates = list[Number]()
+def beside(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
+    """Rates of the controllers' integrals, of the deflections of bristles, ż = v − d(v) z, m/s, and of the works, W."""
+    drives: Any = enumerate(motion.drives.values())
+    rates: list[Number] = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
     for joint, deflection in zip(motion.bristles, at.bristles, strict=True):
         law, slip = law_of(motion.system, joint), primal(back.contacts[joint][0].slip)
         assert law.relaxation is not None  # or it would have no bristles
         decay = law.relaxation(slip, **law_parameters(law, motion.values, joint))
         rates.append(slip - decay * deflection)
-    return rates
+    return [*rates, *works_of(back, at, motion.contacts)]
+
+
+def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
+    """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
+    loads = back.walk.system.mechanism.loads
+    powers: list[Number] = [
+        sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
+        sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
+        sum((state.power for state in back.springs.values()), 0.0),
+        sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
+    ]
+    if contacts.each:
+        powers.append(sum((push.loss for _, push in contacts.pushes(back.walk, at.onsets)), 0.0))
+    return powers
+
+
+def kinetic_energy(walk: Forward) -> Number:
+    """T = ½ Σ (m v² + ωᵀ J ω), J.
+
+    Worked out from the momenta, as the inertia loads of links that stand still and are accelerated at their velocities:
+    so that a body is described once, by its inertia load.
+    """
+    algebra, system = walk.algebra, walk.system
+    moved = {
+        link: Motion(motion.frame, algebra.times(0.0, motion.twist), type(motion.acceleration)(*motion.twist))
+        for link, motion in walk.motions.items()
+    }
+    still, energy = replace(walk, motions=moved), 0.0
+    for link in system.mechanism.effective_links:
+        if link == system.mechanism.fixed_link:
+            continue
+        mass, moment = walk.values[f"links.{link}.mass"], still.inertia_moment(link)
+        centre = still.at(link, system.centre(walk.values, link))
+        force = tuple(-mass * a for a in centre.acceleration)
+        load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
+        energy = energy - 0.5 * algebra.power(load, walk.motions[link].twist)
+    return energy
+
+
+def potential_energy(walk: Forward) -> Number:
+    """−Σ m g·r, J: of gravity, against the origin of the ground."""
+    system, energy = walk.system, 0.0
+    gravity = system.vector(walk.values, "gravity")
+    if not any(np.any(part) for part in gravity):
+        return 0.0
+    for link in system.mechanism.effective_links:
+        if link != system.mechanism.fixed_link:
+            place = walk.at(link, system.centre(walk.values, link)).place
+            for g, coordinate in zip(gravity, place, strict=True):
+                energy = energy - walk.values[f"links.{link}.mass"] * g * coordinate
+    return energy

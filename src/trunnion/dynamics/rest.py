@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.dynamics.guards import first_crossing
-from trunnion.dynamics.rates import Layout, powers_of
+from trunnion.dynamics.rates import Layout, works_of
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.backward import Backward
 
-__all__ = ["Meanwhile", "Rest"]
+__all__ = ["Rest"]
 
 Array = NDArray[np.float64]
 
@@ -110,44 +112,27 @@ class Rest:
     def powers(self, at: Moment) -> Array:
         """What goes into the works of `rates.WORKS`, W, (work, lane)."""
         with np.errstate(all="ignore"):
-            return powers_of(self.back(at), at.q.shape[1])
+            powers = works_of(self.back(at), at, self.motion.contacts)
+            return np.array([np.broadcast_to(primal(power), at.q.shape[1]) for power in powers], float)
 
-    def meanwhile(self, begin: float, row: Array, end: float, now: float) -> Meanwhile | None:
-        """Powers and works during a rest, where work is done; all powers are asked for at once."""
+    def meanwhile(self, begin: float, row: Array, end: float, now: float) -> Callable[[Array], Array] | None:
+        """Works since the begin of a rest by time, J, (work, time), where work is done; all powers are asked for at
+        once, and go over into works as Chebyshev polynomials."""
         if not (self.driven and end > begin):
             return None
         nodes, edges = chebyshev.chebpts1(NODES), np.linspace(begin, end, PANELS + 1)
-        times = (edges[:-1, None] + 0.5 * (edges[1] - edges[0]) * (1.0 + nodes)).ravel()
+        half = 0.5 * (edges[1] - edges[0])
+        times = (edges[:-1, None] + half * (1.0 + nodes)).ravel()
         powers = self.powers(self._moment(times, row, begin, 0.0, now)).reshape(-1, PANELS, NODES)
         vander = chebyshev.chebvander(nodes, NODES - 1)
         through = np.linalg.solve(vander, np.moveaxis(powers, -1, 0).reshape(NODES, -1)).reshape(NODES, -1, PANELS)
-        return Meanwhile(edges, np.asarray(through, np.float64))
-
-
-@dataclass(frozen=True)
-class Meanwhile:
-    """What goes into the works during a rest: Chebyshev polynomials through powers, W, (coefficient, work, panel)."""
-
-    edges: Array
-    through: Array
-
-    def powers(self, time: Array) -> Array:
-        """Powers, W, (work, time)."""
-        panel, place = self._place(time)
-        return np.asarray(chebyshev.chebval(place, self.through[:, :, panel], tensor=False), np.float64)
-
-    def works(self, time: Array) -> Array:
-        """Works since the begin, J, (work, time)."""
-        panel, place = self._place(time)
-        half = 0.5 * (self.edges[1] - self.edges[0])
-        integrals: Array = np.asarray(half * chebyshev.chebint(self.through, lbnd=-1), np.float64)
+        integrals: Array = np.asarray(half * chebyshev.chebint(through, lbnd=-1), np.float64)
         each = integrals.sum(axis=0)  # every polynomial is 1 at 1
         before = np.cumsum(each, axis=1) - each
-        works: Array = before[:, panel] + chebyshev.chebval(place, integrals[:, :, panel], tensor=False)
-        return works
 
-    def _place(self, time: Array) -> tuple[NDArray[np.intp], Array]:
-        """The panel of each time, and the place in it from −1 to 1."""
-        panel = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, PANELS - 1)
-        half = 0.5 * (self.edges[1] - self.edges[0])
-        return panel, (time - self.edges[panel]) / half - 1.0
+        def works(time: Array) -> Array:
+            panel = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, PANELS - 1)
+            place = (time - edges[panel]) / half - 1.0
+            return np.asarray(before[:, panel] + chebyshev.chebval(place, integrals[:, :, panel], tensor=False))
+
+        return works

@@ -2,47 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.active_motion import ActiveMotion
-from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
-from trunnion.dynamics.compiled_closed import compiled_closed
+from trunnion.algebra.dual import single
+from trunnion.dynamics.checks import check_start, refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_rates import rates_of
-from trunnion.dynamics.filling import Filling
-from trunnion.dynamics.impact_motion import ImpactMotion
+from trunnion.dynamics.filling import filled
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
-from trunnion.dynamics.opened import in_play, is_rigid, opened
+from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
-from trunnion.dynamics.rates import Layout, Walks
-from trunnion.dynamics.result import Books, Found, result_of
-from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
+from trunnion.dynamics.result import Found, result_of
+from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.stated_contacts import contacts_of
-from trunnion.dynamics.steady import steady as steady_result
+from trunnion.dynamics.steady_cycle import steady as steady_result
+from trunnion.dynamics.touching import contacts_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.change_points import TOUCHING
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.results.result import Result
 
-__all__ = ["check_start", "simulate", "simulated"]
+__all__ = ["simulate", "simulated"]
 
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
 ACCOUNT, MISSED = 1e-8, 10.0  # what the energy account may miss, of the energy turned over; times the tolerance
 HELPS = 0.3  # of what the account missed: a finer motion that misses more is the last
-BESIDE, MASSLESS = 0.1, 1e-15  # rad, or of the size: how far from the start more inertia may be; a share that is none
 FINER = 2  # motions with a tenth of the tolerance of the last, at most, that are tried where it misses more
 
 
@@ -74,8 +68,7 @@ def simulate(
     steady
         Instead of the motion from its start the cycle that it comes to repeat, see `dynamics.steady_cycle`.
     evaluations
-        Of the accelerations, at most. A motion that needs more ends there, with a finding that names what makes it
-        stiff.
+        Of the accelerations, at most. A motion that needs more ends there, with a finding.
 
     Returns
     -------
@@ -109,28 +102,34 @@ def simulated(
 ) -> Result:
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
-    run = prepare(mechanism, free=True)
-    playing = in_play(mechanism)
+    run, playing = prepare(mechanism, free=True), in_play(mechanism)
     if not playing:
         refuse_undetermined(run)
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance, evaluations)
     if steady:
         return steady_result(mechanism, duration, steps, tolerance, progress, evaluations)
+    motion, bare = FreeMotion.of(run), None
     if playing:
-        return _with_play(run, duration, steps, tolerance, progress, evaluations)
-    motion = FreeMotion.of(run)
-    load_places = places(motion)
-    rates, row, time = rates_of(motion), initial_row(motion), np.linspace(0.0, duration, steps + 1)
-    check_start(motion, row, ranges(motion, motion.names, load_places))
+        bare = opened(run)
+        loose, contacts = prepare(bare.mechanism, free=True), contacts_of(run, playing)
+        refuse_undetermined(loose, playing)
+        motion = FreeMotion.of(loose, contacts)
+        tolerance *= min(1.0, contacts.least_clearance / single(run.system.size(run.values)))
+        tolerance = max(tolerance, FINEST)
+    load_places, row, rates = places(motion, mechanism.drivers), initial_row(motion), rates_of(motion)
+    check_start(motion, row, load_places.limits)
+    if playing:
+        refuse_massless(motion, row)
+    time = np.linspace(0.0, duration, steps + 1)
 
     def found(tolerance: float) -> Found:
         motion.begin(None)
         integration = integration_of(motion, rates, load_places, duration, tolerance, progress, evaluations)
         solution = integration.run(row.copy())
-        return Found.of(run, solution, time, lambda when: Filling(motion, solution, when).books())
+        return Found.of(run, solution, time, lambda when: filled(motion, solution, when, bare))
 
-    return result_of(motion, _balanced(found, tolerance), duration)
+    return result_of(motion, _balanced(found, tolerance), duration, run)
 
 
 def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
@@ -155,68 +154,6 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
 
 def _exhausted(integrated: Found) -> bool:
     return integrated.solution.ended is not None and integrated.solution.ended.code == "simulate.evaluations"
-
-
-def _with_play(
-    run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None,
-    evaluations: int,
-) -> Result:  # fmt: skip
-    """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
-    bare = opened(run)
-    contacts = contacts_of(run, in_play(run.system.mechanism))
-    loose = prepare(bare.mechanism, free=True)
-    refuse_undetermined(loose, in_play(run.system.mechanism))
-    motion = FreeMotion.of(loose, contacts)
-    row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
-    check_start(motion, row, limits)
-    refuse_massless(motion, row)
-    fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
-    times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
-    integrating = _integrating(motion, is_rigid(run.system.mechanism))
-
-    def found(tolerance: float) -> Found:
-        integration = integrating(
-            duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
-        )
-        solution = integration.run(row.copy())
-
-        def between(when: Array) -> Books:
-            return Filling(motion, solution, when, bare).books()
-
-        return Found.of(run, solution, time, between, integration.finished())
-
-    return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
-
-
-def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ActiveMotion]:
-    """What integrates a motion with joints in play."""
-    if rigid:
-        return partial(ImpactMotion, motion, compiled_closed(motion) or Walks(motion))
-    return partial(ActiveMotion, motion, rates_of(motion))
-
-
-def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
-    """MechanismError for a start outside a range, at a change point, or where nothing moves that has a mass."""
-    for name, (low, high) in limits.items():
-        place = row[motion.names.index(name)]
-        if not low <= place <= high:
-            what = f"begins at {place:g} (SI), outside its range from {low:g} to {high:g}"
-            raise MechanismError(Finding(what, f"drivers.{name}.initial", "begin within the range"))
-    at = Layout.of(motion).moment(np.zeros(1), row[:, None])
-    for module, margin in zip(motion.meeting, motion.margins(motion.walk(at, np.zeros_like(at.q))), strict=True):
-        if np.ravel(margin)[0] < TOUCHING:
-            links = ", ".join(motion.system.plan.modules[module].links)
-            what = f"begins at a change point: two assembly modes of the links {links} coincide there"
-            raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin elsewhere"))
-    if len(motion.names) != 1:
-        return
-    rows = np.repeat(row[:, None], 2, axis=1)
-    rows[0, 1] += BESIDE * (1.0 if motion.system.turns(motion.names[0]) else motion.system.size(motion.values))
-    inertia, shifted = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
-    if inertia < MASSLESS * shifted:
-        what = "begins where nothing moves that has a mass, as at a dead centre, so that it has no acceleration there"
-        remedy = "state the inertia of the link or the rotor that it turns, or begin elsewhere"
-        raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", remedy))
 
 
 def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: int) -> None:

@@ -31,6 +31,23 @@ class Event(NamedTuple):
     unit: str = ""
 
 
+class Impact(NamedTuple):
+    """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
+    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s,
+    and what the contact law has lost, J."""
+
+    label: str
+    begin: float
+    end: float
+    approach: float
+    separation: float
+    force: float
+    depth: float
+    wear: float
+    impulse: float
+    loss: float = 0.0
+
+
 class Stretch(NamedTuple):
     """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
 
@@ -62,7 +79,7 @@ class Ended(NamedTuple):
 class Solution:
     """What an integration found: stretches one after the other, events, and why it ended early, if it did.
 
-    notes: figures of findings by their code.
+    notes: figures of findings by their code; impacts: contacts of joints in play that are over, at the end all.
     """
 
     layout: Layout
@@ -71,6 +88,7 @@ class Solution:
     ended: Ended | None = None
     asked: int = 0
     notes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    impacts: list[Impact] = field(default_factory=list)
 
     @property
     def end(self) -> float:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
 
-__all__ = ["Places", "initial_row", "load_times", "places", "ranges"]
+__all__ = ["Places", "initial_row", "load_times", "places"]
 
 Array = NDArray[np.float64]
 
@@ -23,21 +23,16 @@ CLOSE = 1e-9  # of the way: bends that are one
 
 @dataclass(frozen=True)
 class Places:
-    """Coordinates of the one free driver at which a force jumps or bends, the period after which they come again, and
-    the coordinates between which the nominal cycle knows the assembly.
+    """Coordinates of the one free driver at which a force jumps or bends, and the period after which they come again.
 
-    meetings: coordinates at which two assemblies of a module meet and the motion ends, with its number; they are among
-    the bends.
+    limits: coordinates between which free drivers may move, by name; meetings: coordinates at which two assemblies of a
+    module meet and the motion ends, with its number; they are among the bends.
     """
 
     bends: tuple[float, ...] = ()
     period: float | None = None
-    limits: tuple[float, float] = (-np.inf, np.inf)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     meetings: tuple[tuple[float, int], ...] = ()
-
-
-def _number(values: object) -> float:
-    return float(np.ravel(primal(values))[0])
 
 
 def initial_row(motion: FreeMotion) -> Array:
@@ -47,21 +42,9 @@ def initial_row(motion: FreeMotion) -> Array:
     for i, name in enumerate(motion.names):
         path = f"drivers.{name}"
         begin = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(values, name)).value
-        row[i] = _number(values.get(f"{path}.initial.coordinate", begin))
-        row[layout.coordinates + i] = _number(values.get(f"{path}.initial.speed", 0.0))
+        row[i] = single(values.get(f"{path}.initial.coordinate", begin))
+        row[layout.coordinates + i] = single(values.get(f"{path}.initial.speed", 0.0))
     return row
-
-
-def ranges(motion: FreeMotion, drivers: Iterable[str], load_places: Places) -> dict[str, tuple[float, float]]:
-    """The coordinates between which free drivers may move, of those that have a range."""
-    if len(motion.system.mechanism.drivers) == 1:
-        return {motion.names[0]: load_places.limits}
-    ranges_stated = {}
-    for name in drivers:
-        ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
-        if name in motion.names and None not in ends:
-            ranges_stated[name] = min(map(_number, ends)), max(map(_number, ends))
-    return ranges_stated
 
 
 def load_times(motion: FreeMotion, duration: float) -> list[float]:
@@ -70,8 +53,8 @@ def load_times(motion: FreeMotion, duration: float) -> list[float]:
     instants, grid = list[float](), np.linspace(0.0, duration, SCANNED)
     for name, table in mechanism.tables.items():
         if table.over == "time":
-            knots = np.array([_number(motion.values[f"tables.{name}.points.{k}.at"]) for k in range(len(table.points))])
-            period = _number(motion.values.get(f"tables.{name}.period", knots[-1] - knots[0]))
+            knots = np.array([single(motion.values[f"tables.{name}.points.{k}.at"]) for k in range(len(table.points))])
+            period = single(motion.values.get(f"tables.{name}.period", knots[-1] - knots[0]))
             laps = np.arange(int(duration / period) + 2) * period if table.repeats and period > 0 else np.zeros(1)
             instants += list((knots + laps[:, None]).ravel())
     for entry in mechanism.parameter_set.entries.values():
@@ -89,13 +72,19 @@ def load_times(motion: FreeMotion, duration: float) -> list[float]:
     return instants
 
 
-def places(motion: FreeMotion) -> Places:
-    """Of one free driver that alone moves the mechanism; of several, none are known beforehand."""
+def places(motion: FreeMotion, drivers: Collection[str] | None = None) -> Places:
+    """Of one free driver that alone moves the mechanism; of several, ranges alone are known beforehand. drivers: those
+    whose ranges count, all if not given."""
     if len(motion.system.mechanism.drivers) != 1:
-        return Places()
+        limits = {}
+        for name in motion.names:
+            ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
+            if None not in ends and (drivers is None or name in drivers):
+                limits[name] = min(map(single, ends)), max(map(single, ends))
+        return Places(limits=limits)
     run, cycle, (name,) = motion.run, motion.cycle, motion.names
     nominal = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(run.values, name))
-    begin, speed = _number(nominal.value), _number(nominal.rate)
+    begin, speed = single(nominal.value), single(nominal.rate)
     meetings = [
         (time, module)
         for module, each in run.chosen.meetings.items()
@@ -107,10 +96,10 @@ def places(motion: FreeMotion) -> Places:
     times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
     coordinates, span = begin + speed * np.append(times, [time for time, _ in meetings]), abs(speed) * cycle.duration
     if cycle.periodic:
-        return Places(_apart(np.mod(coordinates, span), span), span, meetings=met)
+        return Places(_apart(np.mod(coordinates, span), span), span, {name: (-np.inf, np.inf)}, met)
     low, high = sorted((begin, begin + speed * cycle.duration))
     inside = coordinates[(coordinates > low) & (coordinates < high)]
-    return Places(_apart(inside, span), None, (low, high), met)
+    return Places(_apart(inside, span), None, {name: (low, high)}, met)
 
 
 def _apart(coordinates: Array, span: float) -> tuple[float, ...]:

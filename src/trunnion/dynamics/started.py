@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +18,7 @@ __all__ = ["FIGURES", "NODES", "DriveCourse", "steady_figures"]
 
 Array = NDArray[np.float64]
 
+FIGURES = ("starting_time", "steady_speed", "fluctuation", "peak_effort")
 TURN = 2 * np.pi
 STEADY = 0.02  # of the mean speed: by how much the turn before the last may differ where it runs steadily
 STARTED = 0.95  # of the mean speed of the last turn: from then on it has started
@@ -62,11 +62,6 @@ class DriveCourse:
             effort = motion.given(at, 0.0 * second if stretch.resting else second)[i]
             steps.append(np.array([time, rows[i], rows[n + i], effort]))
         return cls(*np.stack(steps or [np.zeros((4, len(NODES)))], axis=1))
-
-    def figures(self) -> dict[str, float]:
-        """Every figure of `FIGURES`; NaN where the motion has none."""
-        with np.errstate(all="ignore"):
-            return {name: figure(self) for name, figure in FIGURES.items()}
 
     @cached_property
     def gone(self) -> Array:
@@ -120,97 +115,67 @@ class DriveCourse:
                 most = float(here - (after - before) ** 2 / (8.0 * bend))
         return most
 
+    @np.errstate(all="ignore")
+    def figures(self) -> dict[str, float]:
+        """Every figure of `FIGURES`; NaN where the motion has none.
 
-# ---- the figures ----------------------------------------------------------------------------------------------
+        starting_time: the first time, s, at which the mean speed of the turn that ends there is STARTED of that of the
+        last one; steady_speed: of the last whole turn, 2π over the time that it takes, rad/s; fluctuation: its
+        coefficient, (ω_max − ω_min)/ω_mean; peak_effort: the largest |effort|, N m or N.
+        """
+        figures = dict.fromkeys(FIGURES, np.nan)
+        figures["peak_effort"] = max(self.largest(self.effort), self.largest(-self.effort))
+        if np.isfinite(self.last_turn):
+            steady = float(TURN / (self.time[-1, -1] - self.last_turn))
+            speed, since = np.abs(self.speed), self.travel - TURN
+            first = self.at(since, speed)
+            most, least = max(self.largest(speed, since), first), min(-self.largest(-speed, since), first)
+            figures |= {"steady_speed": steady, "fluctuation": (most - least) / steady}
+            if abs(self.speed[0, 0]) < BEGUN * steady:
+                figures["starting_time"] = self._started(TURN / (STARTED * steady))
+        return figures
 
+    def _started(self, limit: float) -> float:
+        """The first time, s, at which the turn that ends there has taken no longer than a limit, s."""
+        gone, time = self.gone.ravel(), self.time.ravel()
 
-def steady_speed(course: DriveCourse) -> float:
-    """Mean speed of the last whole turn, rad/s: 2π over the time that it takes."""
-    return float(TURN / (course.time[-1, -1] - course.last_turn))
+        def longer(place: float) -> float:
+            """By how much the turn that ends here takes longer."""
+            return self.at(place, self.time) - self.at(place - TURN, self.time) - limit
 
-
-def fluctuation(course: DriveCourse) -> float:
-    """Coefficient of fluctuation of the last whole turn: (ω_max − ω_min)/ω_mean."""
-    if np.isnan(course.last_turn):
-        return np.nan
-    speed, since = np.abs(course.speed), course.travel - TURN
-    first = course.at(since, speed)
-    most, least = max(course.largest(speed, since), first), min(-course.largest(-speed, since), first)
-    return (most - least) / steady_speed(course)
-
-
-def starting_time(course: DriveCourse) -> float:
-    """The first time, s, at which the mean speed of the turn that ends there is STARTED of that of the last turn."""
-    steady = steady_speed(course)
-    if not abs(course.speed[0, 0]) < BEGUN * steady:
-        return np.nan
-    limit, gone, time = TURN / (STARTED * steady), course.gone.ravel(), course.time.ravel()
-
-    def longer(place: float) -> float:
-        """By how much the turn that ends here takes longer."""
-        return course.at(place, course.time) - course.at(place - TURN, course.time) - limit
-
-    takes = np.where(gone >= TURN, time - np.interp(gone - TURN, gone, time), np.inf)
-    first = int(np.argmax(takes <= limit))
-    low = max(TURN, float(gone[max(first - len(NODES), 0)]))
-    high = float(gone[min(first + len(NODES), len(gone) - 1)])
-    inside = longer(high) < 0.0 < longer(low)
-    started = brentq(longer, low, high, rtol=1e-15) if inside else low if longer(low) <= 0.0 else high
-    return course.at(started, course.time)
-
-
-def peak_effort(course: DriveCourse) -> float:
-    """The largest |effort| of the drive, N m or N."""
-    return max(course.largest(course.effort), course.largest(-course.effort))
-
-
-FIGURES: dict[str, Callable[[DriveCourse], float]] = {
-    "starting_time": starting_time,
-    "steady_speed": steady_speed,
-    "fluctuation": fluctuation,
-    "peak_effort": peak_effort,
-}
-
-
-# ---- in a summary ---------------------------------------------------------------------------------------------
+        takes = np.where(gone >= TURN, time - np.interp(gone - TURN, gone, time), np.inf)
+        first = int(np.argmax(takes <= limit))
+        low = max(TURN, float(gone[max(first - len(NODES), 0)]))
+        high = float(gone[min(first + len(NODES), len(gone) - 1)])
+        inside = longer(high) < 0.0 < longer(low)
+        started = brentq(longer, low, high, rtol=1e-15) if inside else low if longer(low) <= 0.0 else high
+        return self.at(started, self.time)
 
 
 def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
-    """Mean speed, starting time and coefficient of fluctuation of a free coordinate, see `FIGURES`; or its run-down.
-
-    None of a slide, of less than three turns, or where it does not run steadily; run-down where it rests at the end.
-    """
-    name = motion.names[i]
-    if not solution.stretches:
-        return []
-    if solution.stretches[-1].resting:
-        return _run_down(motion, solution, i)
-    if not motion.system.turns(name):
-        return []
-    figures = DriveCourse.of(motion, solution, i).figures()
-    steady, started = figures["steady_speed"], figures["starting_time"]
-    if not np.isfinite(steady):
-        return []
-    start = Figure(f"{name}.starting_time", f"starting time of {name}", started, "s", f"to {STARTED:.0%} of that speed")
-    return [
-        Figure(f"{name}.speed_mean", f"speed of {name}", steady, "rad/s", "mean of the last turn"),
-        *([start] if np.isfinite(started) else []),
-        Figure(
-            f"{name}.fluctuation", f"coefficient of fluctuation of {name}", figures["fluctuation"], "1", "last turn"
-        ),
-    ]
-
-
-def _run_down(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
-    """How long, and how far, a free coordinate still moves after its motor is switched off, or from the start if it has
-    none, until all rest; nothing if it did not move then."""
+    """Mean speed, starting time and coefficient of fluctuation of a free coordinate, see `FIGURES`; where it rests at
+    the end its run-down: how long, and how far, it still moves after its motor is switched off, or from the start if it
+    has none, until all rest. None of a slide, of less than three turns, or where it does not run steadily."""
     name, drive = list(motion.drives.items())[i]
-    off = 0.0 if drive.motor is None else drive.off_from
-    rest = next((event.time for event in reversed(solution.events) if event.kind == "rest"), np.nan)
-    if not off < rest:
-        return []
-    (begin, end), unit = solution.at(np.array([off, rest]))[0][i], "rad" if motion.system.turns(name) else "m"
+    turns = motion.system.turns(name)
+    if solution.stretches and solution.stretches[-1].resting:
+        off = 0.0 if drive.motor is None else drive.off_from
+        rest = next((event.time for event in reversed(solution.events) if event.kind == "rest"), np.nan)
+        if not off < rest:
+            return []
+        (begin, end), subject = solution.at(np.array([off, rest]))[0][i], f"run-down of {name}"
+        return [
+            Figure(f"{name}.run_down", subject, rest - off, "s", "until it rests"),
+            Figure(f"{name}.run_down_way", subject, end - begin, "rad" if turns else "m", "on its way"),
+        ]
+    figures = DriveCourse.of(motion, solution, i).figures() if turns and solution.stretches else {}
+    told = [
+        ("steady_speed", "speed_mean", f"speed of {name}", "rad/s", "mean of the last turn"),
+        ("starting_time", "starting_time", f"starting time of {name}", "s", f"to {STARTED:.0%} of that speed"),
+        ("fluctuation", "fluctuation", f"coefficient of fluctuation of {name}", "1", "last turn"),
+    ]
     return [
-        Figure(f"{name}.run_down", f"run-down of {name}", rest - off, "s", "until it rests"),
-        Figure(f"{name}.run_down_way", f"run-down of {name}", end - begin, unit, "on its way"),
+        Figure(f"{name}.{short}", subject, figures[key], unit, which)
+        for key, short, subject, unit, which in told
+        if np.isfinite(figures.get(key, np.nan))
     ]

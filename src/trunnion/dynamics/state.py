@@ -10,7 +10,7 @@ a prescribed motion does not solve.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Self
@@ -18,21 +18,20 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.bordered import RANK, nearest, newton_step
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
-from trunnion.dynamics.touching import Closed, Contacts, ContactState, Onset
+from trunnion.dynamics.touching import Closed, Contacts, Onset
 from trunnion.errors import Finding, MechanismError
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["Accelerated", "FreeMotion", "Held", "Linear", "Moment", "rates_of", "repeated"]
+__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Moment", "repeated"]
 
 Array = NDArray[np.float64]
 
@@ -93,6 +92,9 @@ class Held(NamedTuple):
     walls: Sequence[int] = ()
 
 
+NONE = Held()
+
+
 class Linear(NamedTuple):
     """At one moment: masses M (coordinate, coordinate), how rates of gaps and slips follow from those of the
     coordinates, W (2 contacts, coordinate), gaps first, what they are without, (2 contacts,), m/s, and the gaps, m,
@@ -146,6 +148,16 @@ class FreeMotion:
         return self.run.cycle
 
     @cached_property
+    def size(self) -> float:
+        """A typical length, m."""
+        return single(self.system.size(self.values))
+
+    @cached_property
+    def pace(self) -> float:
+        """A typical angular speed, rad/s."""
+        return single(self.system.pace(self.values))
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The free drivers."""
         return tuple(self.drives)
@@ -193,21 +205,17 @@ class FreeMotion:
         return self._typical(self.resisted)
 
     def _typical(self, joints: Sequence[str]) -> Array:
-        pace = max(float(np.ravel(primal(self.system.pace(self.values)))[0]), 1e-300)
-        size = float(np.ravel(self.system.size(self.values))[0])
-        return np.array([pace * pace * (1.0 if self.system.turns(name) else size) for name in joints])
+        pace = max(self.pace, 1e-300)
+        return np.array([pace * pace * (1.0 if self.system.turns(name) else self.size) for name in joints])
 
     @cached_property
     def force(self) -> float:
         """A typical force, N."""
-        size, mass = float(np.ravel(self.system.size(self.values))[0]), 0.0
-        pace = float(np.ravel(primal(self.system.pace(self.values)))[0])
+        mass = 0.0
         for link in self.system.mechanism.effective_links:
-            mass += self._number(f"links.{link}.mass") + self._number(f"links.{link}.inertia") / size**2
-        return max(mass * size * pace * pace, 1e-300)
-
-    def _number(self, path: str) -> float:
-        return float(np.ravel(primal(self.values.get(path, 0.0)))[0])
+            inertia = self.values.get(f"links.{link}.inertia", 0.0)  # in space it is told by axes
+            mass += single(self.values.get(f"links.{link}.mass", 0.0)) + single(inertia) / self.size**2
+        return max(mass * self.size * self.pace * self.pace, 1e-300)
 
     @cached_property
     def trial(self) -> Array:
@@ -215,9 +223,8 @@ class FreeMotion:
 
         The typical one, or that of a fall where it is more, so that weights leave its digits.
         """
-        size = float(np.ravel(self.system.size(self.values))[0])
-        gravity = np.hypot.reduce([float(np.ravel(primal(g))[0]) for g in self.system.vector(self.values, "gravity")])
-        fall = [gravity / (size if self.system.turns(name) else 1.0) for name in self.names]
+        gravity = np.hypot.reduce([single(g) for g in self.system.vector(self.values, "gravity")])
+        fall = [gravity / (self.size if self.system.turns(name) else 1.0) for name in self.names]
         return np.maximum(self.unit, fall)
 
     @cached_property
@@ -260,20 +267,15 @@ class FreeMotion:
         """Motion and forces. zero_slip, sliding: see `backward.Given`; of one coordinate what begins to move in its
         sense."""
         self.walked[0] += 1
+        touches = any(onset is not None for onset in at.onsets)
         given_state = Given(
             self.beginning(at) if zero_slip is None else zero_slip,
             dict(zip(self.bristles, at.bristles, strict=True)),
-            acting=self._acting(at.onsets),
+            acting=(lambda walk: self.contacts.actions(walk, at.onsets)) if touches else None,
             sliding=sliding,
             rests={joint: sense == 0 for joint, sense in zip(self.resisted, at.senses, strict=False)},
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given_state)
-
-    def _acting(self, onsets: Sequence[Onset]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
-        """What the contacts that touch do to the links."""
-        if all(onset is None for onset in onsets):
-            return None
-        return lambda walk: self.contacts.actions(walk, onsets)
 
     def beginning(self, at: Moment, share: Number = 1.0) -> dict[str, Sense]:
         """The sense in which each joint that sticks is about to move, times a share; of several coordinates those in
@@ -481,14 +483,6 @@ class FreeMotion:
         growth: Array = np.linalg.det(stacks[0]) / np.linalg.det(stacks[1])
         return growth
 
-    def turning(self, at: Moment, second: Array, sticks: Sequence[int], shares: Array) -> NDArray[np.bool_]:
-        """Lanes in which more acceleration takes less effort, under shares of what resists some joints,
-        (joint, lane); one lane of `at`."""
-        count, many = len(self.names), repeated(at, second.shape[1])
-        slopes = self._linearised(many, np.vstack([second, shares]), Held(sticks), self.beginning(many))[1]
-        slopes = slopes[:count, :count] * self.unit[None, :, None]
-        return np.asarray(np.linalg.det(np.moveaxis(slopes, -1, 0)) <= 0.0)
-
     # ---- joints that may stick ------------------------------------------------------------------------------------
 
     def speeds(self, walk: Forward, lanes: int) -> Array:
@@ -518,7 +512,7 @@ class FreeMotion:
         ways, speeds = ways[list(sticks)], speeds[list(sticks)]
         if active.closed:
             linear, rows = self.linear(at), [*active.closed, *(len(at.onsets) + k for k in active.walls)]
-            speed = float(np.ravel(self.system.size(self.values) * primal(self.system.pace(self.values)))[0])
+            speed = self.size * self.pace
             ways = np.vstack([ways, linear.ways[rows] * scale / speed])
             speeds = np.concatenate([speeds, (linear.driven + linear.ways @ at.rate[:, 0])[rows] / speed])
         mass = self._mass(at) * scale * scale[:, None]
@@ -559,7 +553,8 @@ class FreeMotion:
         """What impulses come to, at one moment: friction in other joints takes no impulses."""
         states = self.contacts.states(self._by_rates(at))
         gaps = np.array([state.gap[0] for state in states], float)
-        return Linear(self._mass(at), *_differences(rates_of(states)), gaps)
+        rates = np.array([state.rate for state in states] + [state.slip for state in states], float)
+        return Linear(self._mass(at), *_differences(rates), gaps)
 
     def _mass(self, at: Moment) -> Array:
         """∂E/∂q̈ without friction, (equation, coordinate); one lane."""
@@ -573,22 +568,14 @@ class FreeMotion:
         return self.walk(many, np.zeros((count, count + 1)))
 
 
-NONE = Held()
-
-
 def _differences(speeds: Array) -> tuple[Array, Array]:
     """How speeds follow from the rates, (speed, coordinate), and what they are without, (speed,), see `_by_rates`."""
     return speeds[:, 1:] - speeds[:, :1], speeds[:, 0]
 
 
-def rates_of(states: Sequence[ContactState]) -> Array:
-    """Rates of gaps, then slips, (2 contacts, lane), m/s."""
-    return np.array([state.rate for state in states] + [state.slip for state in states], float)
-
-
 def _sticks(onset: Onset) -> bool:
-    """Whether a closed contact does; a sense that is recorded is that of a slip."""
-    return isinstance(onset, Closed) and isinstance(onset.sense, int) and onset.sense == 0
+    """Whether a closed contact does."""
+    return isinstance(onset, Closed) and onset.sense == 0
 
 
 def repeated(at: Moment, times: int) -> Moment:

@@ -4,37 +4,109 @@ Shooting: with P(x) the state one cycle of the first free driver after the state
 found by Newton's method from the last cycle of a run-up, ∂P/∂x by differences, with natural monotonicity (P. Deuflhard,
 Newton Methods for Nonlinear Problems, Springer 2004, section 3.3). Its eigenvalues say what is left of a
 difference after a cycle (A. H. Nayfeh, B. Balachandran, Applied Nonlinear Dynamics, Wiley 1995, sections 2.3 and 6.5).
+What was found becomes the motion law of the drivers (`Repeated`), so that the cycle is analysed as any other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
-from trunnion.dynamics.compiled_rates import CompiledRates, rates_of
+from trunnion.algebra.dual import primal, single
+from trunnion.algebra.namespace import Number
+from trunnion.cycle import summary
+from trunnion.cycle.positions import Positions, positions
+from trunnion.dynamics.compiled_rates import rates_of
+from trunnion.dynamics.filling import filled
+from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
+from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import FINEST, integration_of
-from trunnion.dynamics.rates import Layout, Walks
-from trunnion.dynamics.result import motion_findings
+from trunnion.dynamics.rates import Dynamics, Layout
 from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import Places, initial_row, places
 from trunnion.dynamics.started import DriveCourse
 from trunnion.dynamics.state import FreeMotion
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
+from trunnion.results.figure import Figure
 from trunnion.results.quantities import readable
+from trunnion.results.result import Result
+from trunnion.results.scales import scales_in
+from trunnion.solve.run import prepare
 
-__all__ = ["INDIFFERENT", "SteadyCycle", "UnsteadyError", "refuse_unsteady", "steady_cycle"]
+__all__ = ["Repeated", "UnsteadyError", "motion_law", "steady"]
 
 Array = NDArray[np.float64]
+
+
+DEGREE = 7  # of the polynomials, as of the dense output of DOP853
+# of a step, from its begin −1 to its end 1: within it, for forces may jump at its ends
+NODES: Array = -np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+COEFFICIENTS: Array = np.asarray(np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)), np.float64)
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """Coordinate, rate and second derivative over one cycle, as polynomials step by step.
+
+    begins: of the steps, s, and the end of the last; parts: coefficients of Chebyshev polynomials, (number, step,
+    degree); advance: of the coordinate, rad or m, from cycle to cycle.
+    """
+
+    begins: Array
+    parts: Array
+    advance: float
+
+    @classmethod
+    def of(cls, motion: FreeMotion, solution: Solution) -> list[Repeated]:
+        """Those of the free coordinates, over a solution that ends as it begins but for whole turns."""
+        begins = np.array([stretch.begin for stretch in solution.stretches] + [solution.end])
+        time = 0.5 * (begins[1:] + begins[:-1])[:, None] + 0.5 * np.diff(begins)[:, None] * NODES
+        books = filled(motion, solution, time.ravel())
+        ends, _ = solution.at(np.array([0.0, solution.end]))
+        numbers = np.array([books.at.q, books.at.rate, books.seconds]).reshape(3, -1, *time.shape) @ COEFFICIENTS.T
+        return [cls(begins, numbers[:, i], float(ends[i, 1] - ends[i, 0])) for i in range(len(motion.names))]
+
+    @property
+    def period(self) -> float:
+        """How long a cycle takes, s."""
+        return float(self.begins[-1])
+
+    def at(self, time: Number, parameters: Parameters) -> Drive:
+        """As a motion law has it; `parameters` are not looked at. Of a dual time with its derivative."""
+        moment = np.asarray(primal(time), float)
+        cycles = np.floor(moment / self.period)
+        moment = moment - cycles * self.period
+        step = np.clip(np.searchsorted(self.begins, moment, side="right") - 1, 0, len(self.begins) - 2)
+        place = 2 * (moment - self.begins[step]) / (self.begins[step + 1] - self.begins[step]) - 1
+        basis = np.cos(np.arange(DEGREE + 1) * np.arccos(np.clip(place, -1.0, 1.0))[..., None])
+        value, rate, second = np.sum(self.parts[:, step] * basis, axis=-1)
+        zero = time - primal(time)  # 0, and the derivative of a dual time
+        return Drive(value + cycles * self.advance + rate * zero, rate + second * zero, second + 0.0 * zero)
+
+    def span(self, parameters: Parameters) -> Span:
+        """One cycle, from the nodes of the steps."""
+        values, rates = self.parts[:2] @ chebyshev.chebvander(NODES, DEGREE).T
+        one_way = bool(np.all(rates > 0.0) or np.all(rates < 0.0))
+        return Span(self.period, True, False, one_way, float(np.max(np.abs(rates))), float(np.ptp(values)))
+
+
+def motion_law(repeated: Repeated) -> MotionLaw:
+    """A motion that repeats as the law of a driver."""
+    return MotionLaw(
+        repeated.at, repeated.span, needs=(), source="motion in time", validity="the mechanism it was found for"
+    )
+
 
 TURN = 2 * np.pi
 FINER = 1e-2  # of the tolerance of a run-up: that of the cycles that are compared
@@ -48,86 +120,100 @@ FAR = 20.0  # times the speed at the end of the run-up: the steady speed is not 
 NUDGE = 1e-4  # of the state, by which ∂P/∂x is taken
 INDIFFERENT = 1e-6  # what is left of a difference beyond all of it, but for rounding
 BACKWARD = 1e-9  # of a turn, by which one that goes round and round may seem to go back
+DIFFERS = 1e-3  # of the largest effort: a cycle that is not the one that was found
 
 
 class UnsteadyError(MechanismError):
     """The motion does not come to repeat itself; the findings say why."""
 
 
-class Passage(NamedTuple):
-    """What one cycle after a state comes to: the state then, the time it takes, s, and the motion."""
-
-    state: Array
-    period: float
-    solution: Solution
-
-
-@dataclass
-class SteadyCycle:
-    """A motion that repeats: of these drivers, over one cycle from the start of the first one that goes round.
+class SteadyCycle(NamedTuple):
+    """A motion that repeats, over one cycle from the start of its first driver that goes round.
 
     residual: by how much of the state its end misses its begin; factor: of a difference, from cycle to cycle.
     """
 
-    motion: FreeMotion
     solution: Solution
     first: int
     residual: float
     factor: float
 
-    @property
-    def period(self) -> float:
-        """How long the cycle takes, s."""
-        return self.solution.end
 
+@np.errstate(all="ignore")
+def steady(
+    mechanism: Mechanism, duration: float, steps: int, tolerance: float,
+    progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS,
+) -> Result:  # fmt: skip
+    """The steady cycle of a mechanism as `analyse` gives a cycle: with the speed that varies as it was found.
 
-def refuse_unsteady(mechanism: Mechanism) -> None:
-    """MechanismError with what keeps a free motion from repeating itself, or from being told as a cycle."""
-    if findings := list(_findings(mechanism)):
+    Positions are equally spaced in time. Raises MechanismError where a cycle cannot be asked for, UnsteadyError where
+    there is none.
+    """
+    if findings := list(_refused(mechanism)):
         raise MechanismError(findings)
+    motion = FreeMotion.of(prepare(mechanism))
+    if motion.resisted:
+        what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
+        remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
+        raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])
+    found = _steady_cycle(motion, duration, tolerance, progress, evaluations)
+    each = Repeated.of(motion, found.solution)
+    laws = {name: motion_law(repeated) for name, repeated in zip(motion.names, each, strict=True)}
+    run = prepare(mechanism.with_motions(laws))
+    at = positions(run, steps, engine="numpy")
+    cycle = summary.result_of(run, at)
+    missing = _missing(motion, found, at)
+    figures = [*_figures(motion, found, each[found.first], missing), *summary_of(cycle)]
+    attributes = encoded({
+        **cycle.attrs,
+        "findings": finding_rows([*findings_of(cycle), *_findings(motion.names[found.first], found, missing)]),
+        **scales_in(cycle).summary(figures),
+        "steady": 1,
+    })  # fmt: skip
+    return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))
 
 
-def _findings(mechanism: Mechanism) -> Iterator[Finding]:
-    values = mechanism.parameters()
+def _refused(mechanism: Mechanism) -> Iterator[Finding]:
+    """What keeps a free motion from repeating itself, or from being told as a cycle."""
+    values, joints = mechanism.parameters(), mechanism.effective_joints
+    timed = list[str]()  # what follows the time
     for name, driver in mechanism.drivers.items():
         where, motor = f"drivers.{name}", driver.motor
         if not driver.found:
-            what = "its motion is prescribed over time, and a steady cycle takes the time that it takes"
-            yield Finding(what, where, "let it be free as well, or leave --steady out")
-        if driver.range is not None and PAIRS[mechanism.effective_joints[name].type].turns:
+            timed.append(where)
+        if driver.range is not None and PAIRS[joints[name].type].turns:
             yield Finding("it does not go round, so it has no steady cycle", f"{where}.range", "leave --steady out")
         if motor is None:
             continue
         if motor.clutch is not None:
             what = "a clutch that may slip is not solved in a steady cycle"
             yield Finding(what, f"{where}.motor.clutch", "remove it, or leave --steady out")
-        for key in ("off_from", "brake_from"):
-            if getattr(motor, key) is not None:
-                what = "a steady cycle knows no time at which something is switched"
-                yield Finding(what, f"{where}.motor.{key}", "remove it, or leave --steady out")
-        if motor.over == "time":
-            yield Finding("the motor follows the time", f"{where}.motor.over", "state it over speed")
+        timed += [f"{where}.motor.{key}" for key in ("off_from", "brake_from") if getattr(motor, key) is not None]
+        timed += [f"{where}.motor.over"] * (motor.over == "time")
     for joint in in_play(mechanism):
         what = "it is in play: a cycle knows no contacts that come and go"
         yield Finding(what, f"joints.{joint}.contact", "leave --steady out, or remove the contact")
-    timed = {"time"} | {name for name, table in mechanism.tables.items() if table.over == "time"}
+    clocks = {"time"} | {name for name, table in mechanism.tables.items() if table.over == "time"}
     for path, entry in mechanism.parameter_set.entries.items():
-        if path not in values and entry.varies and timed & set(entry.quantity.names):
-            yield Finding("the load follows the time", path, "state it over drive, or leave --steady out")
+        if path not in values and entry.varies and clocks & set(entry.quantity.names):
+            timed.append(path)
+    for where in timed:
+        what = "it follows the time, and a steady cycle takes the time that it takes"
+        yield Finding(
+            what, where, "state it over the speed or the drive, let the driver be free, or leave --steady out"
+        )
 
 
-def steady_cycle(
-    motion: FreeMotion, duration: float, tolerance: float, progress: Callable[[float], None] | None = None,
-    evaluations: int = MOST_EVALUATIONS,
-) -> SteadyCycle:  # fmt: skip
+def _steady_cycle(
+    motion: FreeMotion, duration: float, tolerance: float, progress: Callable[[float], None] | None, evaluations: int
+) -> SteadyCycle:
     """The steady cycle that a motion comes to from its start. duration: of the run-up, s, which may take up to LONGER
     times as long; tolerance: of its steps; UnsteadyError where there is none."""
     first = next((i for i, name in enumerate(motion.names) if motion.system.turns(name)), None)
     if first is None:
         what = "no free driver goes round, so there is no steady cycle"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}", "leave --steady out"))
-    load_places = places(motion)
-    rates = rates_of(motion)
+    load_places, rates = places(motion), rates_of(motion)
     unstable = None  # one that no run-up comes to, unless it begins there
     for longer in LONGER:
         end = longer * duration
@@ -138,11 +224,11 @@ def steady_cycle(
             break
         if not course.runs:
             continue
-        section = Section.of(motion, load_places, rates, max(FINER * tolerance, FINEST), solution, course, first)
-        repeated_cycle = section.repeated()
-        if repeated_cycle is not None and repeated_cycle.factor <= 1.0 + INDIFFERENT:
-            return repeated_cycle
-        unstable = repeated_cycle or unstable
+        section = Section(motion, load_places, rates, max(FINER * tolerance, FINEST), solution, course, first)
+        cycle = section.repeated()
+        if cycle is not None and cycle.factor <= 1.0 + INDIFFERENT:
+            return cycle
+        unstable = cycle or unstable
     if unstable is not None:
         return unstable
     raise UnsteadyError(_why(motion, solution, course, first))
@@ -150,170 +236,171 @@ def steady_cycle(
 
 def _why(motion: FreeMotion, solution: Solution, course: DriveCourse, first: int) -> list[Finding]:
     """Why there is no steady cycle, from the end of the longest run-up."""
-    name, turns = motion.names[first], course.travel / TURN
+    name, end = motion.names[first], readable(solution.end, "s")
     if not course.runs or solution.ended or solution.stretches[-1].resting:
-        what = f"there is no steady cycle: {name} makes {turns:.3g} turns in {readable(solution.end, 's')} and does "
-        what += "not go round at the end"
+        turns = course.travel / TURN
+        what = f"there is no steady cycle: {name} makes {turns:.3g} turns in {end} and does not go round at the end"
         remedy = "run it without --steady to see the start; give it more --time if it has not run up"
         figures = {"driver": name, "turns": turns, "time": solution.end}
         none = Finding.error("simulate.not_round", f"drivers.{name}", what, remedy, **figures)
         return [none, *motion_findings(motion, solution, motion.run)]
     takes = [course.at(course.travel - k * TURN, course.time) for k in range(3)]
     before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
-    where, change = f"drivers.{name}", last - before
-    what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after "
-    what += f"{readable(solution.end, 's')}, changes by {readable(change, 'rad/s')} a turn, and no speed is found that "
-    what += "comes back"
+    what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after {end}, changes by "
+    what += f"{readable(last - before, 'rad/s')} a turn, and no speed is found that comes back"
     remedy = "check that its losses grow with the speed or that its motor's effort falls; or give it more --time"
-    figures = {"driver": name, "speed": last, "change": change, "time": solution.end}
-    return [Finding.error("simulate.not_repeating", where, what, remedy, **figures)]
+    figures = {"driver": name, "speed": last, "change": last - before, "time": solution.end}
+    return [Finding.error("simulate.not_repeating", f"drivers.{name}", what, remedy, **figures)]
 
 
-@dataclass
 class Section:
-    """The states in which one driver begins its cycle; numbers of a state, those of others by what is typical.
+    """The states in which one driver begins its cycle, from the last passage of a run-up through its begin.
 
-    begin: its coordinate there; way: by how much it goes on in a cycle, with its sign; takes: how long a cycle took, s.
+    A state is what a row holds but the driver's coordinate, integrals of no controller and the works: which says where
+    its numbers stand in a row, turning which are angles, scale what is typical of each. way: by how much the driver
+    goes on in a cycle, with its sign; takes: how long a cycle took, s.
     """
 
-    motion: FreeMotion
-    known: Places
-    rates: CompiledRates | Walks
-    tolerance: float
-    first: int
-    begin: float
-    way: float
-    takes: float
-    row: Array
-    snapshot: Snapshot | None
-
-    @classmethod
-    def of(
-        cls, motion: FreeMotion, load_places: Places, rates: CompiledRates | Walks, tolerance: float,
-        solution: Solution, course: DriveCourse, first: int,
-    ) -> Section:  # fmt: skip
-        """The last passage of a run-up through the begin of the cycle."""
+    def __init__(
+        self, motion: FreeMotion, load_places: Places, rates: Dynamics, tolerance: float, solution: Solution,
+        course: DriveCourse, first: int,
+    ) -> None:  # fmt: skip
+        self.motion, self.places, self.rates, self.tolerance, self.first = motion, load_places, rates, tolerance, first
         span = load_places.period if load_places.period is not None else TURN
         start, gone = float(course.coordinate[0, 0]), course.travel
         sense = 1.0 if course.coordinate[-1, -1] > start else -1.0
-        begin = float(np.ravel(primal(motion.system.drive(motion.values, motion.names[first], 0.0)[0]))[0])
-        ahead = np.mod(sense * (begin - start), span)
+        self.begin = single(motion.system.drive(motion.values, motion.names[first], 0.0)[0])
+        ahead = np.mod(sense * (self.begin - start), span)
         passed = ahead + span * np.floor((gone - ahead) / span)
         time, before = (course.at(max(at, 0.0), course.time) for at in (passed, passed - span))
+        self.way, self.takes = sense * span, time - before
         rows, which = solution.at(np.array([time]))
-        snapshot = solution.stretches[which[0]].snapshot
-        if snapshot is not None:
-            snapshot = replace(snapshot, time=snapshot.time - time)
-        return cls(
-            motion, load_places, rates, tolerance, first, begin, sense * span, time - before, rows[:, 0], snapshot
-        )
+        self.row, self.snapshot = rows[:, 0], self._from(solution.stretches[which[0]].snapshot, time)
+        self.layout, names = Layout.of(motion), motion.names
+        n, drives = self.layout.coordinates, enumerate(motion.drives.values())
+        idle = [2 * n + i for i, drive in drives if not drive.controlled]
+        self.which = np.delete(np.arange(3 * n + self.layout.bristles), [first, *idle])
+        self.turning = np.array([k < n and motion.system.turns(names[k]) for k in self.which], bool)
+        speed, size = abs(float(self.row[n + first])), motion.size
+        sizes = np.array([1.0 if motion.system.turns(name) else size for name in names])
+        bristles = np.maximum(np.abs(self.row[3 * n : self.layout.slip]), 1e-6 * size)
+        self.scale = np.concatenate([sizes, speed * sizes, speed * self.takes * sizes, bristles])[self.which]
 
-    # ---- the numbers of a state -------------------------------------------------------------------------------
+    @staticmethod
+    def _from(snapshot: Snapshot | None, time: float) -> Snapshot | None:
+        """A snapshot as it is for a motion that begins at a time, s."""
+        return None if snapshot is None else replace(snapshot, time=snapshot.time - time)
 
-    @property
-    def _numbers(self) -> NDArray[np.intp]:
-        """Where in a row they stand: all but the coordinate of the driver, integrals of no controller and the works."""
-        layout, drives = Layout.of(self.motion), self.motion.drives.values()
-        idle = [2 * layout.coordinates + i for i, drive in enumerate(drives) if not drive.controlled]
-        return np.delete(np.arange(3 * layout.coordinates + layout.bristles), [self.first, *idle])
-
-    def _turning(self) -> NDArray[np.bool_]:
-        """Which of them are angles, alike after whole turns."""
-        names, which = self.motion.names, self._numbers
-        return np.array([k < len(names) and self.motion.system.turns(names[k]) for k in which], bool)
-
-    def _scale(self) -> Array:
-        """What is typical of each of them."""
-        n, speed = len(self.motion.names), abs(float(self.row[len(self.motion.names) + self.first]))
-        size = float(np.ravel(self.motion.system.size(self.motion.values))[0])
-        sizes = np.array([1.0 if self.motion.system.turns(name) else size for name in self.motion.names])
-        scale = np.ones(3 * n + Layout.of(self.motion).bristles)
-        scale[:n], scale[n : 2 * n], scale[2 * n : 3 * n] = sizes, speed * sizes, speed * self.takes * sizes
-        scale[3 * n :] = np.maximum(np.abs(self.row[3 * n : len(scale)]), 1e-6 * size)
-        return scale[self._numbers]
-
-    # ---- cycle after cycle ------------------------------------------------------------------------------------
-
-    def after(self, state: Array) -> Passage | None:
-        """One cycle after a state; None where the driver does not get there, or not one way."""
+    def after(self, state: Array) -> tuple[Array, Solution] | None:
+        """What one cycle after a state misses it by, P(x) − x, in parts of what is typical, and the motion; None where
+        the driver does not get there, or not one way."""
         row = np.zeros_like(self.row)
-        row[self.first], row[self._numbers] = self.begin, state
+        row[self.first], row[self.which] = self.begin, state
         for longer in (1.5, 6.0, 24.0):
             self.motion.begin(self.snapshot)
-            integration = self._integration(longer * self.takes)
-            solution = integration.run(row)
+            duration = longer * self.takes
+            solution = integration_of(self.motion, self.rates, self.places, duration, self.tolerance).run(row)
             course = DriveCourse.of(self.motion, solution, self.first)
             gone = np.sign(self.way) * (course.coordinate - self.begin).ravel()
             if np.any(np.diff(gone) < -BACKWARD) or not len(solution.stretches):
                 return None
             if gone[-1] >= abs(self.way):
                 period = course.at(abs(self.way), course.time)
-                return Passage(solution.at(np.array([period]))[0][self._numbers, 0], period, _until(solution, period))
+                miss = solution.at(np.array([period]))[0][self.which, 0] - state
+                miss[self.turning] = np.mod(miss[self.turning] + np.pi, TURN) - np.pi
+                return miss / self.scale, _until(solution, period)
             if solution.ended:
                 return None
         return None
 
-    def _integration(self, duration: float) -> Integration:
-        return integration_of(self.motion, self.rates, self.known, duration, self.tolerance)
-
-    def _miss(self, state: Array, passage: Passage, scale: Array) -> Array:
-        """P(x) − x, in parts of what is typical."""
-        miss = passage.state - state
-        turning = self._turning()
-        miss[turning] = np.mod(miss[turning] + np.pi, TURN) - np.pi
-        misses: Array = miss / scale
-        return misses
-
     def repeated(self) -> SteadyCycle | None:
-        """The state that comes back, from the last one of the run-up; None if it is not found."""
-        scale, state = self._scale(), self.row[self._numbers].copy()
+        """The state that comes back, from the last one of the run-up, with the eigenvalue that says what is left of a
+        difference; None if it is not found."""
+        state = self.row[self.which].copy()
         passage = self.after(state)
         for _ in range(ROUNDS):
-            if passage is None or (slopes := self._slopes(state, passage, scale)) is None:
+            if passage is None or (slopes := self._slopes(state, passage[0])) is None:
                 return None
-            miss = self._miss(state, passage, scale)
-            step = -np.linalg.lstsq(slopes, miss, rcond=None)[0]
-            most = float(np.max(np.abs(miss)))
-            if np.max(np.abs(step)) <= SURE or most <= NOISE * self.tolerance:
-                return self._found(state + step * scale, scale, slopes)
+            step = -np.linalg.lstsq(slopes, passage[0], rcond=None)[0]
+            if np.max(np.abs(step)) <= SURE or np.max(np.abs(passage[0])) <= NOISE * self.tolerance:
+                passage = self.after(state + step * self.scale)
+                if passage is None or (most := float(np.max(np.abs(passage[0])))) > REPEATED:
+                    return None
+                factor = float(np.max(np.abs(np.linalg.eigvals(slopes + np.eye(len(state))))))
+                return SteadyCycle(passage[1], self.first, most, factor)
             for size in HALVED:
-                tried = state + size * step * scale
+                tried = state + size * step * self.scale
                 passage = self.after(tried) if self._near(tried) else None
                 if passage is None:
                     continue
-                simplified = np.linalg.lstsq(slopes, self._miss(tried, passage, scale), rcond=None)[0]
+                simplified = np.linalg.lstsq(slopes, passage[0], rcond=None)[0]
                 if np.linalg.norm(simplified) < np.linalg.norm(step):
                     break
             state = tried
         return None
 
-    def _slopes(self, state: Array, passage: Passage, scale: Array) -> Array | None:
+    def _slopes(self, state: Array, miss: Array) -> Array | None:
         """∂(P − x)/∂x by differences, in parts of what is typical; None where a state near by does not come back."""
-        slopes, miss = np.empty((len(state), len(state))), self._miss(state, passage, scale)
-        for k, nudge in enumerate(NUDGE * scale):
-            nudged = state + np.where(np.arange(len(state)) == k, nudge, 0.0)
-            other = self.after(nudged)
+        slopes = np.empty((len(state), len(state)))
+        for k, nudge in enumerate(np.diag(NUDGE * self.scale)):
+            other = self.after(state + nudge)
             if other is None:
                 return None
-            slopes[:, k] = (self._miss(nudged, other, scale) - miss) / NUDGE
+            slopes[:, k] = (other[0] - miss) / NUDGE
         return slopes
 
     def _near(self, state: Array) -> bool:
         """Whether the driver still goes round in the same sense, at a speed of the same order."""
-        place = int(np.flatnonzero(self._numbers == len(self.motion.names) + self.first)[0])
-        share = state[place] / self.row[len(self.motion.names) + self.first]
+        speed = self.layout.coordinates + self.first
+        share = state[self.which == speed][0] / self.row[speed]
         return bool(np.all(np.isfinite(state)) and 1 / FAR < share < FAR)
-
-    def _found(self, state: Array, scale: Array, slopes: Array) -> SteadyCycle | None:
-        """The steady cycle from a state that comes back, with the eigenvalue that says what is left of a difference."""
-        passage = self.after(state)
-        if passage is None or (most := float(np.max(np.abs(self._miss(state, passage, scale))))) > REPEATED:
-            return None
-        factor = float(np.max(np.abs(np.linalg.eigvals(slopes + np.eye(len(state))))))
-        return SteadyCycle(self.motion, passage.solution, self.first, most, factor)
 
 
 def _until(solution: Solution, time: float) -> Solution:
     """A solution up to a time."""
-    stretches = [item._replace(end=min(item.end, time)) for item in solution.stretches if item.begin < time]
-    return replace(solution, stretches=stretches, events=[item for item in solution.events if item.time <= time])
+    stretches = [each._replace(end=min(each.end, time)) for each in solution.stretches if each.begin < time]
+    return replace(solution, stretches=stretches, events=[each for each in solution.events if each.time <= time])
+
+
+# ---- what is told of it -------------------------------------------------------------------------------------------
+
+
+def _missing(motion: FreeMotion, cycle: SteadyCycle, at: Positions) -> float:
+    """By how much the efforts that the cycle takes differ from those of the motors, of the largest.
+
+    Where a joint is at rest for a moment its friction may act either way: such positions tell nothing.
+    """
+    efforts = filled(motion, cycle.solution, at.time).arrays["drive_effort"]
+    differences = np.abs(at.arrays["drive_effort"] - efforts)[:, at.arrays["status"] == Status.SOLVED]
+    return float(np.nanmax(differences, initial=0.0)) / max(float(np.max(np.abs(efforts))), 1e-300)
+
+
+def _figures(motion: FreeMotion, cycle: SteadyCycle, repeated: Repeated, missing: float) -> Sequence[Figure]:
+    """What is said of a steady cycle before what is said of any cycle."""
+    name, mean = motion.names[cycle.first], abs(repeated.advance) / repeated.period
+    course = DriveCourse.of(motion, cycle.solution, cycle.first)
+    speed, subject = np.abs(course.speed), f"speed of {name}"
+    most, least = course.largest(speed), -course.largest(-speed)
+    return [
+        Figure("cycle_time", "time of the cycle", repeated.period, "s"),
+        Figure(f"{name}.speed_mean", subject, mean, "rad/s", "mean"),
+        Figure(f"{name}.speed_max", subject, most, "rad/s", "largest"),
+        Figure(f"{name}.speed_min", subject, least, "rad/s", "smallest"),
+        Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", (most - least) / mean, "1"),
+        Figure("decay", "what is left of a difference after a cycle", cycle.factor, "1"),
+        Figure("repeats", "by how much the end misses the begin", cycle.residual, "1", "of the state"),
+        Figure("efforts_differ", "efforts of cycle and motors, difference", missing, "1", "of the largest"),
+    ]
+
+
+def _findings(driver: str, cycle: SteadyCycle, missing: float) -> Iterator[Finding]:
+    if cycle.factor > 1.0 + INDIFFERENT:
+        what = f"the steady cycle is not stable: a difference from it grows by the factor {cycle.factor:.4g} with "
+        what += "every cycle"
+        remedy = "run it without --steady to see how it leaves this cycle"
+        yield Finding.warning("simulate.unstable", f"drivers.{driver}", what, remedy, factor=cycle.factor)
+    if not missing <= DIFFERS:
+        what = f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} of the largest: "
+        what += "it is not the motion that was found"
+        remedy = "run it without --steady to see the motion from its start"
+        yield Finding.error("simulate.cycle_differs", "", what, remedy, share=missing)

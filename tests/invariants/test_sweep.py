@@ -182,7 +182,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "nothing": ({}, "0 names"), "seven names": ({f"n{i}": [1] for i in range(7)}, "7 names"),
     "unknown name": ({"AX": [1, 2]}, "known: 'AB', 'BC'"),
     "several numbers": ({"coefficient": [0.1, 0.2]}, "say which"),
-    "not one number": ({"joints.B.pin": [0.1]}, "set one of"),
+    "not one number": ({"joints.B.pin": [0.1]}, "is no number, but has one"),
     "the same twice": ({"AB": [2], "dimensions.AB": [2]}, "same number"),
     "wrong unit": ({"A.speed": ["1 kg", "2 kg"]}, "angular speed"),
     "one end without unit": ({"AB": (1, "2000 mm", 3)}, "1 has no unit"), "no values": ({"AB": []}, "no values"),

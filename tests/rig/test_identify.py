@@ -357,7 +357,7 @@ def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechan
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"parameters": ["friction"]}, "not one number"),
+        ({"parameters": ["friction"]}, "stands for"),
         ({"parameters": {"a": [FRICTION], "b": [FRICTION]}}, "is in 'a' already"),
         ({"parameters": ["A.speed"]}, "sets drivers.A.speed"),
         ({"parameters": []}, "no parameter to identify"),

@@ -157,7 +157,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
     [
         ([], "no parameter to identify"),
         (["--parameter", "=A"], "names no number"),
-        (["--parameter", "mu=friction"], "is not one number"),
+        (["--parameter", "mu=friction"], "stands for"),
         (["--parameter", FRICTION, "--channel", "torque-out"], "the measurement has torque-in"),
         (["--parameter", FRICTION, "--hold-out", "run-7"], "there is no condition 'run-7'"),
         (["--parameter", FRICTION, "--kind", "histogram"], "use one of intervals, correlation, residuals"),

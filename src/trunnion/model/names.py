@@ -105,8 +105,8 @@ class ParameterNames:
             return short[0]
         if several := paths or below:
             examples = ", ".join(several[:6]) + (", …" if len(several) > 6 else "")
-            what = f"the name '{name}' stands for {len(several)} numbers: it is not one number"
-            raise MechanismError(Finding(what, remedy=f"say which: {examples}"))
+            why = f"stands for {len(several)} numbers" if len(several) > 1 else "is no number, but has one"
+            raise MechanismError(Finding(f"the name '{name}' {why}", remedy=f"say which: {examples}"))
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
         every = [*self.paths, *self.endings]

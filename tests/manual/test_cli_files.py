@@ -294,5 +294,5 @@ def test_every_option_that_takes_a_path_is_an_output() -> None:
         assert command.callback is not None
         assert command.callback.__wrapped__  # type: ignore[attr-defined]
         found |= set(outputs(command.callback))
-    assert found == {"assemblies", "checkpoint", "out", "report", "to", "write", "write_mapping"}
+    assert found == {"assemblies", "checkpoint", "out", "report", "to", "write"}
     assert isinstance(cli.app, typer.Typer)

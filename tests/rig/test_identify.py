@@ -169,8 +169,7 @@ def test_a_product_is_not_taken_apart(four_bar: trunnion.Mechanism, torque: True
     assert np.isnan(found["estimate"].values).all()
     assert np.isnan(found["upper"].values).all()
     text = said(found, "warning")
-    assert "they have the same effect on torque; their product is determined, 0." in text
-    assert "neither alone" in text
+    assert "they have the same effect on torque" in text
     for kind in KINDS:
         assert figure(found, kind).get_size_inches()[0] > 3
 

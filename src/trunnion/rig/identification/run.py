@@ -27,16 +27,15 @@ from trunnion.rig.identification.fit import (
     Block,
     Evaluations,
     Fit,
-    SensorError,
     refined,
     sensor_errors,
     shared_zero,
     solved,
 )
-from trunnion.rig.identification.result import Identified, MisfitCause, dataset
+from trunnion.rig.identification.result import Identified, dataset
 from trunnion.rig.identification.signals import Model, Parameters, described, unknowns
-from trunnion.rig.identification.uncertainty import inseparable, quantile, spread_of
-from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_unit, same_cycle
+from trunnion.rig.identification.uncertainty import inseparable, spread_of
+from trunnion.rig.modelled import each, in_condition, measure_of, refuse_unit, same_cycle
 from trunnion.rig.reading.measurement import (
     Accuracy,
     Condition,
@@ -45,7 +44,6 @@ from trunnion.rig.reading.measurement import (
     efficiency_of,
     load_joints,
     pairs_of,
-    rms,
 )
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -61,9 +59,6 @@ NOTHING = 1e-9  # of a course: what an unknown does to it
 MOST_NAMED = 6  # conditions in a message
 SAME = 1e-6  # of a setting
 HALVINGS = 8  # of a friction that locks at the start
-EXPLAINS = 0.8  # of a misfit, at least, for a cause of it to be named
-SETTLED = np.radians(0.01)
-ROUNDS = 5  # of the angle
 
 
 @strict_arguments
@@ -147,11 +142,7 @@ def identify(
         fit = replace(fit, inflation=spread.excess)
         best = best._replace(x=solved(fit, best.x).x)
         spread = spread_of(fit, best.x)
-    cycles = [model.cycle(k, best.x[: fit.count]) for k in range(len(conditions))]
-    other_speed = any(apart(condition.speed, cycle.speed) for condition, cycle in zip(conditions, cycles, strict=True))
-    causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not other_speed else []
-    groups = inseparable(fit, best.x, spread)
-    return dataset(Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder))
+    return dataset(Identified(mechanism, measurement, fit, best, spread, inseparable(fit, best.x, spread), encoder))
 
 
 # ---- the data -------------------------------------------------------------------------------------------------
@@ -327,46 +318,3 @@ def _runnable(fit: Fit) -> Array:
         remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
         raise MechanismError(Finding(what, "data", remedy))
     return best
-
-
-def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
-    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more.
-
-    A zero and a gain of each channel, and an offset of the angle; nothing is stated of them.
-    """
-    causes, channels = [], list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted))
-    for kind, channel in (*product(("zero", "gain"), channels), ("angle", "")):
-        own_blocks, unit = [block for block in fit.blocks if block.channel == channel], 0.01
-        sizes = np.array([unit * (block.channel == channel) for block in fit.blocks])
-        if kind == "zero":
-            usual = rms(np.concatenate([block.signal.turns.ravel() for block in own_blocks])) or 1.0
-            sizes, unit = sizes * usual, unit * usual
-        elif kind == "angle":
-            sizes = np.array([-unit / fit.model.cycles[block.condition].turn for block in fit.blocks])
-            sizes *= [block.signal.turns.shape[1] > 2 for block in fit.blocks]
-        if not (np.isfinite(sizes).all() and np.any(sizes)):
-            continue
-        error, size, begin, moved = SensorError(kind, channel, kind, sizes, stated=False), 0.0, start, fit
-        with suppress(ValueError):  # no answer of the model there
-            for _ in range(ROUNDS if kind == "angle" and fit.model.run.cycle.periodic else 1):
-                more, best = refined(
-                    replace(moved, sensors=[*fit.sensors, error], inflation=1.0), np.append(begin, 0.0)
-                )
-                begin, step, size = best.x[:-1], float(best.x[-1]) * unit, size + float(best.x[-1]) * unit
-                if abs(step) < SETTLED or abs(size) > np.pi:
-                    break
-                phases = zip(fit.model.phases, fit.model.cycles, strict=True)  # follow the angle until it is settled
-                shifted = tuple((phase + size / cycle.turn) % 1.0 for phase, cycle in phases)
-                moved = replace(fit, courses_at=Evaluations(replace(fit.model, phases=shifted)))
-            spread = spread_of(more, best.x)
-            half, share = quantile(spread.freedom) * spread.deviation, (reduced - spread.test.reduced) / (reduced - 1)
-            wide = float(half[-1]) * unit
-            much = abs(size) > np.pi if kind == "angle" else kind == "gain" and size < 2e-6 - 1  # nothing is left
-            if share >= EXPLAINS and abs(size) > wide and not much:
-                alike = [sensor for sensor in fit.sensors if (sensor.kind, sensor.channel) == (kind, channel)]
-                deviations = (sensor.angle if kind == "angle" else np.abs(sensor.sizes).max() for sensor in alike
-                            if sensor.stated)  # fmt: skip
-                largest = max(map(float, deviations), default=0.0)
-                times, n = abs(size) / largest if largest else 0.0, fit.count
-                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[:n], half[:n]))
-    return sorted(causes, key=lambda item: -round(item.explains, 2))  # of equal ones first the simplest

@@ -1,6 +1,6 @@
 """The table of file formats: by extension, what reads and what writes them, and the module that does it.
 
-A new format is a module with `read(path, options)`, which returns a Draft, or `write(positions, path, options)`, and
+A new format is a module with `read(path, options)`, which returns a Draft, or `write(positions, path)`, and
 an entry here.
 """
 
@@ -28,7 +28,7 @@ from trunnion.model.units import KINDS, Kind, UnitError
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["FORMATS", "MATERIALS", "ExportOptions", "Format", "ImportOptions", "export_model", "import_file"]
+__all__ = ["FORMATS", "MATERIALS", "Format", "ImportOptions", "export_model", "import_file"]
 
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
              "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
@@ -86,21 +86,6 @@ class ImportOptions:
     drive: str = ""
     unit: float = 1e-3
     unit_stated: bool = False
-
-
-@dataclass(frozen=True)
-class ExportOptions:
-    """How a file is written.
-
-    Parameters
-    ----------
-    row : of the position, for formats of one position; frames : of those that move.
-    original : the file that the model was imported from, for formats that move its parts.
-    """
-
-    row: int = 0
-    frames: int = 120
-    original: Path | None = None
 
 
 def _format_of(path: Path, reads: bool) -> Format:
@@ -255,7 +240,6 @@ def export_model(
     path: str | os.PathLike[str],
     at: float | str | None = None,
     frames: int = 120,
-    original: str | os.PathLike[str] | None = None,
     magnify: float = 1.0,
 ) -> list[Finding]:
     """Write a mechanism in the format of another program.
@@ -266,7 +250,6 @@ def export_model(
     path : the file; its extension decides the format.
     at : the position, as for `analyse`; the first of the cycle if not given. Formats that move take the whole cycle.
     frames : number of positions in a format that moves.
-    original : the STEP file that the model was imported from, whose parts are written where they are then.
     magnify : factor of the displacements of the links from the ideal mechanism, in formats that are looked at.
 
     Returns
@@ -277,7 +260,7 @@ def export_model(
     ------
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
-    path, options = Path(path), ExportOptions(0, frames, None if original is None else Path(original))
+    path = Path(path)
     entry = _format_of(path, reads=False)
     module = _module(entry, path)
     moves = getattr(module, "MOVES", False)
@@ -288,12 +271,6 @@ def export_model(
         raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
     span = (frames, None) if moves else (FEWEST, at)
     positions = positions_of(mechanism, *span, magnify=magnify)
-    if options.original is not None:
-        if not getattr(module, "MOVES_PARTS", False):
-            raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
-        reading(options.original)
-        with _readable(options.original):
-            options.original.open("rb").close()
     with whole(path) as temporary:
-        findings: list[Finding] = module.write(positions, temporary, options)
+        findings: list[Finding] = module.write(positions, temporary)
     return findings

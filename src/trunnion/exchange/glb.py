@@ -21,7 +21,7 @@ from trunnion.exchange.skeleton import Positions
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
-    from trunnion.exchange.formats import ExportOptions, ImportOptions
+    from trunnion.exchange.formats import ImportOptions
 
 __all__ = ["MOVES", "read", "write"]
 
@@ -42,7 +42,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     return read_meshes(path, options)
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the links with their poses at all solved positions of the cycle."""
     solved = np.all([np.isfinite(origin).all(axis=1) for origin in positions.origins.values()], axis=0)
     if not solved.any():

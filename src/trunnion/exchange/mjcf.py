@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
 from trunnion.exchange.draft import Array, Body, Draft, Pair, about, united
-from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import (
     APART,
     WORLD,
@@ -354,13 +354,13 @@ def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
 STEP = 0.001  # s, of the simulation
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the mechanism as MJCF: bodies with the global axes, each with its origin at the joint that carries it.
 
     A loop is closed at a ball by one `connect`, at a pin by two on its axis; at any other joint the body after it is
     halved, and a `weld` holds its halves together, so mass and mobility stay.
     """
-    draft = opening(positions, options.row)
+    draft = opening(positions)
     tree, cuts = spanning(draft)
     root = Element("mujoco", model=draft.name or "mechanism")
     compiler = SubElement(root, "compiler", angle="radian", autolimits="true")

@@ -215,9 +215,9 @@ def laid_out(
     return origins, inner, closing, rates
 
 
-def opening(positions: Positions, row: int, also: str = "") -> Draft:
+def opening(positions: Positions, also: str = "") -> Draft:
     """The draft to write, with notes on what the format cannot hold."""
-    draft, mechanism = positions.draft(row), positions.mechanism
+    draft, mechanism = positions.draft(), positions.mechanism
     places = (path.split(".") for path, value in mechanism.parameters().items() if np.any(primal(value)))
     entries = {place[2] for place in places if place[0] == "joints" and place[-1] != "pair_factor"}
     lost = [name for name in LOST if getattr(mechanism, name)] + sorted(entries - {"pitch"})

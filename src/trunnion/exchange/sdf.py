@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
 from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair
-from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import (
     WORLD,
     Frame,
@@ -255,12 +255,12 @@ def _pose(pose: Element | None, name: str) -> Frame:
 # Out
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the mechanism as SDF: links with the global axes, each with its origin at the joint that carries it.
 
     Cylindrical and planar pairs, which SDF lacks, are rows of joints with bodies of 1e-9 kg between.
     """
-    draft = opening(positions, options.row)
+    draft = opening(positions)
     root = Element("sdf", version="1.10")
     world = SubElement(root, "world", name="default")
     _leaf(world, "gravity", np.zeros(3) if draft.gravity is None else draft.gravity)

@@ -227,8 +227,6 @@ def test_names_with_spaces_and_greek_letters_are_fine(program: Run, tmp_path: Pa
         (["--criterion", "-1"], "criterion"),
         (["--out", "r.ods"], ".csv"),
         (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
-        (["--variables", "reaction_forces"], "reaction_force"),
-        (["--variables", "drive_effort", "--report", "r.html"], "all variables"),
     ],
 )
 def test_bad_options_are_refused_with_a_message(program: Run, tmp_path: Path, options: list[str], word: str) -> None:

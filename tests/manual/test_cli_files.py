@@ -63,7 +63,7 @@ def test_debug_shows_where(
     assert "please report" in err.splitlines()[-1]
 
 
-PARTS = ["--steps", "300000", "--variables", "drive_effort"]  # so many positions are written some at a time
+PARTS = ["--steps", "100000"]  # so many positions are written some at a time
 
 
 def limited() -> None:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
-    from trunnion.rig.virtual.observe import Observation
 
 __all__ = ["compare", "data", "estimated", "identify", "rig"]
 
@@ -66,7 +65,10 @@ def rig(
                 observation = observe(mechanism, rig_model, seed, progress)
         except MechanismError as error:  # findings about the rig bear the line of its file
             raise MechanismError(placed_in_rig(error.findings, rig_file)) from None
-    _about(observation)
+    conditions = counted(len(observation.cases), "condition")
+    line(rig_model.name or "Test rig", "bold")
+    line(f"{mechanism.name or 'no name'}; {conditions} of {counted(rig_model.schedule.turns, 'cycle')}; "
+         f"{observation.rate:g} samples a second; {counted(observation.rows, 'row')}")  # fmt: skip
     if out:
         with bar("files", len(observation.cases), least=FEWEST) as progress:
             names = observation.write(out, format_, progress)
@@ -76,20 +78,6 @@ def rig(
         line(f"  {span}, {', '.join(names[-2:])}")
     say(placed_in_rig(observation.findings, rig_file))
     raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
-
-
-def _about(observation: "Observation") -> None:
-    """What is recorded: conditions, turns, samples."""
-    conditions = len(observation.cases)
-    rows = max(case.rows for case in observation.cases)
-    line(observation.rig.name or "Test rig", "bold")
-    texts = (
-        observation.mechanism.name or "no name",
-        f"{counted(conditions, 'condition')} of {counted(observation.rig.schedule.turns, 'cycle')}",
-        f"{observation.rate:g} samples a second",
-        counted(observation.rows, "row") + (f", at most {rows:,} a file" if conditions > 1 else ""),
-    )
-    line("; ".join(texts))
 
 
 # ---- data ------------------------------------------------------------------------------------------------------------

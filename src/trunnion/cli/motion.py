@@ -43,25 +43,15 @@ __all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]
 def analyse(
     model: Model, files: Files, settled: Friction, steps: Steps = 360, at: OnePosition = None, uncut: Uncut = False,
     engine: Engine = "auto",
-    variables: Annotated[
-        list[str] | None,
-        Option("--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable."),
-    ] = None,
-    dtype: Annotated[str, Option("--dtype", help="Numbers of the files: float64, or float32.")] = "float64",
 ) -> None:  # fmt: skip
     """Analyse a cycle: motion, reactions, friction, effort, power."""
-    from trunnion.cycle.positions import Kept
-
     check_files(files, drawn=False, instead=f"trunnion plot {model.file}")
-    selection = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
-    if files.report and selection.variables is not None:
-        raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
     if files.report and at:
         raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
     mechanism = model.read()
     saved = {"units_row": files.units_row, "columns": files.columns, "units": files.units}
     with model.lines():
-        result = _analysed(mechanism, steps, settled.checked(), engine, selection, files.out or [], saved, at)
+        result = _analysed(mechanism, steps, settled.checked(), engine=engine, out=files.out or [], saved=saved, at=at)
 
     def show_position() -> None:
         """Every number of one position, with its unit."""
@@ -152,12 +142,12 @@ def report(
     raise Exit(exit_status(findings_of(result)))
 
 
-def _analysed(mechanism: "Mechanism", steps: int, method: "FrictionMethod | None" = None, *more: Any) -> "Result":
+def _analysed(mechanism: "Mechanism", steps: int, method: "FrictionMethod | None" = None, **more: Any) -> "Result":
     """Analyse, with a progress bar when it takes long enough to need one. more: engine, … of `analysed`."""
     from trunnion.cycle.analyse import analysed
 
     with bar("positions", steps, least=200_000) as progress:
-        return analysed(mechanism, steps, method, progress, *more)
+        return analysed(mechanism, steps, method, progress, **more)
 
 
 def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":

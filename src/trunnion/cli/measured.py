@@ -158,7 +158,7 @@ def identify(
     channel: Annotated[
         list[str] | None,
         Option("--channel",
-               help="A channel by its name in the mapping, or efficiency. Repeatable; default: all usable ones."),
+               help="A channel by its name in the mapping. Repeatable; default: all usable ones."),
     ] = None,
     start: Annotated[
         list[str] | None, Option("--start", help="NAME=VALUE: start value; default: the value in the model.")

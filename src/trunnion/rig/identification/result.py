@@ -359,7 +359,7 @@ def _sensors(identified: Identified) -> Iterator[Finding]:
     """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit."""
     fit, bare = identified.fit, dict[str, bool]()
     for block in (fit.blocks[k] for k in fit.fitted):
-        has_error = bool(block.effects or shared_zero(block.signal.accuracy) or block.signal.accuracy.gain)
+        has_error = bool(shared_zero(block.signal.accuracy) or block.signal.accuracy.gain)
         bare[block.channel] = bare.get(block.channel, True) and not has_error
     if names := [name for name, is_bare in bare.items() if is_bare and not fit.model.measures[name].of_motion]:
         what = f"no accuracy is stated for {_joined(names)}: zero and gain count as exact, and the intervals are too "

@@ -18,18 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measures.measures import Measure, named
+from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.identification.fit import (
-    EFFICIENCY,
-    FILE_ZERO,
     Block,
     Evaluations,
     Fit,
     refined,
     sensor_errors,
-    shared_zero,
     solved,
 )
 from trunnion.rig.identification.result import Identified, dataset
@@ -37,13 +34,8 @@ from trunnion.rig.identification.signals import Model, Parameters, described, un
 from trunnion.rig.identification.uncertainty import inseparable, spread_of
 from trunnion.rig.modelled import each, in_condition, measure_of, refuse_unit, same_cycle
 from trunnion.rig.reading.measurement import (
-    Accuracy,
     Condition,
     Measurement,
-    Signal,
-    efficiency_of,
-    load_joints,
-    pairs_of,
 )
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -84,8 +76,7 @@ def identify(
     measurement : as `rig.read` or `rig.observe` has it.
     parameters : names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
         be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`.
-    channels : of the measurement; all that an unknown acts on if not given; `efficiency` is computed of torques and
-        speeds.
+    channels : of the measurement; all that an unknown acts on if not given.
     start : where the search begins, by name, SI or texts with units; the model's values if not given.
     hold_out : conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted
         but predicted.
@@ -112,7 +103,7 @@ def identify(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    blocks = _blocks(mechanism, measurement, channels, held_out(mechanism, measurement, hold_out))
+    blocks = _blocks(measurement, channels, held_out(mechanism, measurement, hold_out))
     if follow := [seat.joint for seat in run.seats if seat.given is None]:
         what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
         raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
@@ -149,7 +140,6 @@ def identify(
 
 
 def _blocks(
-    mechanism: Mechanism,
     measurement: Measurement,
     channels: Sequence[str] | None,
     held_conditions: tuple[frozenset[str], float],
@@ -158,21 +148,17 @@ def _blocks(
 
     held_conditions: conditions by name, and the share of the turns of each, the last ones.
     """
-    conditions, joints, (names, share) = measurement.conditions, load_joints(mechanism), held_conditions
+    conditions, (names, share) = measurement.conditions, held_conditions
     every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
     if not every:
         raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
-    computed = [EFFICIENCY] if any(pairs_of(condition, joints) for condition in conditions) else []
-    if missing := [name for name in channels or () if name not in (*every, *computed)]:
-        remedy = f"the measurement has {', '.join(every)}{f', and {EFFICIENCY} of them' if computed else ''}"
+    if missing := [name for name in channels or () if name not in every]:
+        remedy = f"the measurement has {', '.join(every)}"
         raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "channels", remedy))
     blocks = []
-    picked = every if channels is None else [name for name in dict.fromkeys([*every, *computed]) if name in channels]
+    picked = every if channels is None else [name for name in every if name in channels]
     for (index, condition), channel in product(enumerate(conditions), picked):
-        signal, effects = condition.courses.get(channel), dict[str, float]()
-        if signal is None and channel == EFFICIENCY and pairs_of(condition, joints):
-            signal, effects = _efficiency(condition, joints)
-        if signal is None:
+        if (signal := condition.courses.get(channel)) is None:
             continue
         turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
         fitted = len(turns) - (max(1, round(share * len(turns))) if share else 0)
@@ -182,23 +168,10 @@ def _blocks(
             raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
         fitted = 0 if condition.name in names else fitted
         first, last = (replace(signal, turns=part) for part in (turns[:fitted], turns[fitted:]))
-        blocks.append(Block(index, channel, first, last, effects))
+        blocks.append(Block(index, channel, first, last))
     if not any(len(block.signal.turns) for block in blocks):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return blocks
-
-
-def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Signal, dict[str, float]]:
-    """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
-    efficiency, effects = efficiency_of(condition, joints), dict[str, float]()
-    for term in efficiency.contributions:
-        accuracy = condition.courses[term.channel].accuracy if term.channel in condition.courses else Accuracy()
-        if term.source == "gain":
-            effects[f"gain of {term.channel}"] = term.sensitivity * term.input
-        elif term.source == "zero":
-            effects[f"zero of {term.channel}"] = term.sensitivity * shared_zero(accuracy)
-            effects[f"{FILE_ZERO} of {term.channel}"] = term.sensitivity * accuracy.own
-    return Signal(EFFICIENCY, "efficiency:cycle", "1", efficiency.per_turn[:, None]), effects
 
 
 def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) -> tuple[frozenset[str], float]:
@@ -276,8 +249,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
     measures: dict[str, Measure] = {}
     for block in blocks:
         channel, text = block.channel, block.signal.measures
-        of_turns = (channel, text, block.signal.turns.shape[1]) == (EFFICIENCY, "efficiency:cycle", 1)
-        measure = named(mechanism, [text], run.values)[0] if of_turns else measure_of(mechanism, run, channel, text)
+        measure = measure_of(mechanism, run, channel, text)
         refuse_unit(run, measure, channel, block.signal)
         if measures.setdefault(channel, measure).name != measure.name:
             what = f"measures {measures[channel].name} in one condition and {measure.name} in another"

@@ -202,13 +202,19 @@ def simulate(
     from trunnion.dynamics.opened import in_play
     from trunnion.dynamics.simulate import simulated
     from trunnion.dynamics.steady_cycle import UnsteadyError
+    from trunnion.results.tables import check_table
 
     of = "cycle" if steady else "motion"
     check_files(files, of, kind if files.out else None)
     duration = seconds(time, "--time", "2s")
     mechanism = model.read()
-    if files.out and not in_play(mechanism):
-        _check_without_play(files, of, kind)
+    if not in_play(mechanism):  # then there are no contacts to write or draw
+        for path in files.out or ():
+            check_table(path, of, in_play=False)
+        if kind and files.out:
+            from trunnion.views.motion.figure import check_contacts  # with matplotlib
+
+            check_contacts(kind, in_play=False)
     with model.lines(), bar("%", PERCENT) as progress:
         reached = None if progress is None else lambda share: progress(int(PERCENT * share))
         try:
@@ -216,18 +222,6 @@ def simulate(
         except UnsteadyError as unsteady:
             end(unsteady.findings, model.file, "drivers")
     Shown(result, model, files, "drivers", drawn={"kind": kind}).finish()
-
-
-def _check_without_play(files: Files, of: str, kind: str | None) -> None:
-    """MechanismError for a table or figure of contacts, of which there are none without joints in play."""
-    from trunnion.results.tables import check_table
-
-    for path in files.out or ():
-        check_table(path, of, in_play=False)
-    if kind:
-        from trunnion.views.motion.figure import check_contacts
-
-        check_contacts(kind, in_play=False)
 
 
 # ---- locking ---------------------------------------------------------------------------------------------------------

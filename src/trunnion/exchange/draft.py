@@ -208,16 +208,12 @@ class Draft:
                 findings.append(Finding(f"has the type {pair.type!r}, which is no pair", f"joints.{pair.name}"))
             numbers = np.concatenate([pair.at, pair.axis])
             if not np.abs(pair.at).max() < FARTHEST:
-                findings.append(
-                    Finding(f"lies {np.abs(pair.at).max():.3g} m away", f"joints.{pair.name}", "mend the file")
-                )
+                what = f"lies {np.abs(pair.at).max():.3g} m away"
+                findings.append(Finding(what, f"joints.{pair.name}", "mend the file"))
             if not np.isfinite(numbers).all() or not np.linalg.norm(pair.axis) > 0:
                 findings.append(Finding("has no place or no axis", f"joints.{pair.name}", "mend the file"))
-            findings += [
-                Finding(f"joins {link!r}, which the file does not have", f"joints.{pair.name}")
-                for link in pair.links
-                if link not in self.bodies
-            ]
+            strange = [link for link in pair.links if link not in self.bodies]
+            findings += [Finding(f"joins {link!r}, which it does not have", f"joints.{pair.name}") for link in strange]
         for body in self.bodies.values():
             if not (np.isfinite(body.mass) and np.isfinite(body.centre).all() and np.isfinite(body.inertia).all()):
                 findings.append(Finding("has a mass, centre or inertia that is no number", f"links.{body.name}"))

@@ -44,17 +44,8 @@ UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144,
 HALF = 1e-3  # rad, by which a half circle may differ from one
 NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
 # what the library lets through of damaged files; a generator that ends too early is a RuntimeError or a StopIteration
-SPOILT = (
-    DXFError,
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    LookupError,
-    RuntimeError,
-    StopIteration,
-    TypeError,
-    ValueError,
-)
+SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, StopIteration,
+          TypeError, ValueError)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +75,8 @@ class Slot(Line):
 
     def holds(self, at: Array, radius: float, near: float) -> bool:
         """Whether a pin lies on the middle line and fits in."""
-        along, aside = (
-            (at - self.start) @ self.span / self.length,
-            abs(_cross(self.span, at - self.start)) / self.length,
-        )
+        off = at - self.start
+        along, aside = off @ self.span / self.length, abs(_cross(self.span, off)) / self.length
         return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
 
 
@@ -388,9 +377,8 @@ class _Reader:
             near = [sorted(both) for both in itertools.product(pins, holes) if abs(both[0] - both[1]) <= self.gap]
             fits = near[0] if len(near) == 1 else pins if len(pins) == 1 and not holes else []
             circles = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*pins, *holes}))
-            pair = self._add(
-                "revolute", (hub, other), number, f"{hub} and {other} share a place; radii: {circles or 'none'}"
-            )
+            comment = f"{hub} and {other} share a place; radii: {circles or 'none'}"
+            pair = self._add("revolute", (hub, other), number, comment)
             pair.pin_radius, pair.hole_radius = [*fits, None, None][:2]
             if circles and not fits:
                 what = f"has circles of {circles} radius, of which none are clearly its pin and hole"
@@ -409,9 +397,8 @@ class _Reader:
         chance: set[frozenset[str]] = set()
         for both in _lying(self.sketch.lines, self.gap):
             layers = frozenset(line.layer for line in both)
-            bodies = [
-                all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line]) for line in both
-            ]
+            bodies = [all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line])
+                      for line in both]  # fmt: skip
             if all(bodies) or any(layers <= self.marks[k].keys() for k in self.joined):
                 continue
             if any(bodies):
@@ -420,15 +407,11 @@ class _Reader:
             for line in both:
                 guided.setdefault(layers, {}).setdefault(line.layer, {})[line] = None
         for layers in sorted(chance - guided.keys(), key=sorted):
-            what = (
-                f"lines of {' and '.join(sorted(layers))} lie on each other, but one ends at joints; no guide is read"
-            )
+            what = f"lines of {' and '.join(sorted(layers))} lie on each other, one between joints: no guide is read"
             draft.note("exchange.line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
         for lines in guided.values():
-            free = {
-                layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
-                for layer, drawn in lines.items()
-            }
+            free = {layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
+                    for layer, drawn in lines.items()}  # fmt: skip
             self._guide({layer: free[layer] or list(lines[layer]) for layer in lines})
         return set(guided)
 
@@ -477,14 +460,11 @@ class _Reader:
         """
         draft, at = self.draft, self.places[number]
         layer, radii = next(iter(self.marks[number].items()))
-        slots = [
-            slot for slot in self.slots if slot.layer != layer and slot.holds(at, min(radii), 10 * TOUCH * self.size)
-        ]
+        radius, slack = min(radii), 10 * TOUCH * self.size
+        slots = [slot for slot in self.slots if slot.layer != layer and slot.holds(at, radius, slack)]
         if len(slots) == 1:
-            slot, radius = slots[0], min(radii)
-            comment = (
-                f"a pin of {layer}, radius {_mm(radius)} mm, in a slot of {slot.layer}, {_mm(2 * slot.half)} mm wide"
-            )
+            slot = slots[0]
+            comment = f"a pin of {layer}, radius {_mm(radius)} mm, in a slot of {slot.layer}, {_mm(2 * slot.half)} mm"
             block = free_name(f"block in {slot.layer}", draft.bodies, "block")
             draft.bodies[block] = Body(block, comments=[f"{comment}: a block without mass lies between them"])
             self._add("revolute", (layer, block), number, comment).pin_radius = radius or None

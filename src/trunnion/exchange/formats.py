@@ -162,14 +162,8 @@ def import_file(
     """
     path = Path(path)
     heaviness = _material(material) if density is None else _number(density, "density", KINDS["density"])
-    options = ImportOptions(
-        ground,
-        heaviness,
-        _number(gap, "gap", KINDS["length"]),
-        drive,
-        _number(f"1 {unit}", "unit", KINDS["length"]),
-        unit != "mm",
-    )
+    largest, length = _number(gap, "gap", KINDS["length"]), _number(f"1 {unit}", "unit", KINDS["length"])
+    options = ImportOptions(ground, heaviness, largest, drive, length, unit != "mm")
     rate, turns = _speed(speed)
     if str(path).startswith(LINKS):
         draft = import_module("trunnion.exchange.pmks").read_link(str(path), options)

@@ -106,12 +106,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
         raise MechanismError(Finding(what, file=str(path), remedy="join the parts in FreeCAD's Assembly workbench"))
     draft = Draft(outer[0].label)
     if len(outer) > 1:
-        draft.warn(
-            "exchange.assemblies",
-            "",
-            f"{outer[0].label} is read of {len(outer)} assemblies",
-            "keep the others in files",
-        )
+        what = f"{outer[0].label} is read of {len(outer)} assemblies"
+        draft.warn("exchange.assemblies", "", what, "keep the others in files")
     try:
         _Assembly(objects, outer[0], draft).read()
     except (ValueError, KeyError, IndexError):
@@ -119,9 +115,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if not draft.pairs:
         raise MechanismError(Finding("has no joint between two parts that is read", file=str(path)))
     what = f"masses of {len(draft.bodies)} parts are not read: they follow from shapes that only FreeCAD knows"
-    draft.note(
-        "exchange.masses", "links", what, "write mass, centre and inertia of each link, or import the parts as STEP too"
-    )
+    draft.note("exchange.masses", "links", what, "write those of each link, or import the parts as STEP too")
     return draft
 
 
@@ -225,9 +219,8 @@ class _Assembly:
                 frame = frame @ target.frame("LinkPlacement", "Placement")
             if part.first("LinkedObject").get("file") and len(path) > k + 2:
                 what = f"joins a part in another file, {'.'.join(path)}: where it lies in that is not known"
-                self.draft.warn(
-                    "exchange.outside", f"joints.{joint.label}", what, "look at its place, or join the part itself"
-                )
+                remedy = "look at its place, or join the part itself"
+                self.draft.warn("exchange.outside", f"joints.{joint.label}", what, remedy)
             inside = self.objects.get(path[k + 1]) if len(path) > k + 1 else None
             if target.type == BODY and inside is not None and inside.type in IN_BODIES:
                 frame = frame @ inside.frame("Placement")
@@ -250,14 +243,10 @@ class _Assembly:
         kind = kinds[int(joint.value("JointType", "0"))]
         (part, first), (mate, second) = self._connector(joint, "1"), self._connector(joint, "2")
         if not joint.on("Activated", "true") or joint.on("Suppressed"):
-            draft.note(
-                "exchange.inactive", where, "is not active, and left out", "activate it in FreeCAD if it is meant"
-            )
+            draft.note("exchange.inactive", where, "is not active, and left out", "activate it in FreeCAD")
         elif kind not in PAIRS:
             what = f"is of the kind {kind}, which is no pair, and is left out"
-            draft.warn(
-                "exchange.joint", where, what, "add what it holds to the model, a gear, rack or screw under gears"
-            )
+            draft.warn("exchange.joint", where, what, "add it to the model, a gear, rack or screw under gears")
         elif not part or not mate or part == mate:
             draft.warn("exchange.open", where, "does not join two parts, and is left out", "give it two connectors")
         else:

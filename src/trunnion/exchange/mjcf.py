@@ -165,9 +165,8 @@ class _Reader(Scene):
         limited = values.get("limited", "auto")
         automatic = limited == "auto" and self.compiler.get("autolimits") != "false"
         if "range" in values and kind != "ball" and (limited == "true" or automatic):
-            ends = numbers(values["range"], f"range of {where}", 2) - numbers(
-                values.get("ref"), f"ref of {where}", 1, (0,)
-            )
+            ends = numbers(values["range"], f"range of {where}", 2)
+            ends = ends - numbers(values.get("ref"), f"ref of {where}", 1, (0,))
             low, high = ends * (self.angle if kind == "hinge" else 1.0)
             pair.limits = float(low), float(high)
         self._note_lost("joint", values, name)

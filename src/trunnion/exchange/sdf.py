@@ -147,20 +147,13 @@ class Reader(Scene):
     def add_joints(self) -> None:
         """Make pairs of the joints that were collected, and points of the frames."""
         bodies = self.draft.bodies
-        if (
-            any(end_of(part, tag) == WORLD for part, _ in self.joints for tag in ("parent", "child"))
-            or self.draft.pairs
-        ):
+        ends = {end_of(part, tag) for part, _ in self.joints for tag in ("parent", "child")}
+        if WORLD in ends or self.draft.pairs:
             bodies.setdefault(WORLD, Body(WORLD))
         for part, prefix in self.joints:
             if part.get("type") == "gearbox":
-                draft = self.draft
-                draft.warn(
-                    "exchange.gears",
-                    f"joints.{part.get('name')}",
-                    "is a gearbox, which is not read",
-                    "state it under gears",
-                )
+                where, what = f"joints.{part.get('name')}", "is a gearbox, which is not read"
+                self.draft.warn("exchange.gears", where, what, "state it under gears")
             elif part.get("type") != "floating":
                 self.add_pair(self._pair(part, prefix))
             mimic = part.find("axis/mimic")

@@ -81,9 +81,7 @@ def _drafted(file: Part21, options: ImportOptions) -> Draft:
             names = [str(file[solid.number][file.kind(solid.number)][0] or "") for _, solid, _ in solids]
             names = [label if text in ("", "NONE") else text for text in names]
             what = f"is the only part, with {len(solids)} solids: each is taken as a link"
-            draft.warn(
-                "exchange.solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids)
-            )
+            draft.warn("exchange.solids", f"links.{label}", what, "export an assembly", count=len(solids))
             groups = [(text, [entry]) for text, entry in zip(names, solids, strict=True)]
         else:
             groups = [(label, solids)] if solids else []
@@ -138,13 +136,7 @@ def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry], 
     draft.warn("exchange.rigid", f"links.{name}", what, remedy)
 
 
-def _body(
-    assembly: Assembly,
-    name: str,
-    entries: Sequence[Entry],
-    options: ImportOptions,
-    draft: Draft,
-) -> Body:
+def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: ImportOptions, draft: Draft) -> Body:
     """A link of solids: mass, centre and inertia in the global frame."""
     total = Moments()
     body = Body(name)
@@ -339,9 +331,7 @@ def write(positions: Positions, path: Path) -> list[Finding]:
         )
         text(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
     path.write_text(text.text(), encoding="ascii")
-    draft.note(
-        "exchange.skeleton", "", "points, axes and lines are written; a STEP file has no masses, joints or friction"
-    )
+    draft.note("exchange.skeleton", "", "points, axes and lines are written, without masses, joints and friction")
     return draft.findings
 
 

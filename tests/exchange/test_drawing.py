@@ -27,7 +27,7 @@ from mechanisms import (
     watt_six_bar,
 )
 from trunnion.exchange import export_model, import_file
-from trunnion.exchange.dxf import write
+from trunnion.exchange.drawing import write
 from trunnion.exchange.skeleton import positions_of
 
 EXAMPLES = DURANGO.parent

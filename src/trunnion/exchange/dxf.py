@@ -24,14 +24,14 @@ from ezdxf.lldxf.const import DXFError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name
-from trunnion.exchange.drawing import AUXILIARY, write
+from trunnion.exchange.drawing import AUXILIARY
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
     from trunnion.exchange.formats import ImportOptions
 
-__all__ = ["read", "write"]
+__all__ = ["read"]
 
 GROUNDS = ("ground", "frame", "base", "fixed")  # words in the name of a layer that does not move; else it is layer 0
 CHAINED = ("CENTER", "DASHDOT", "DIVIDE", "MITTE", "ACAD_ISO04", "ACAD_ISO10")  # how linetypes of centre lines begin
@@ -132,9 +132,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
         what = f"is damaged, and {what}" if any(f.code == "exchange.damaged" for f in draft.findings) else what
         remedy = "draw each link on a layer of its own: its pins as circles, lines between them"
         raise MechanismError(Finding(what, file=str(path), remedy=remedy))
-    if sketch.left:
-        left = ", ".join(f"{count} {kind}" for kind, count in sketch.left.most_common(6))
-        draft.note("exchange.left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
+    for kind, count in sketch.left.most_common(6):
+        draft.lose(f"{count} {kind}")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
         draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
@@ -343,8 +342,7 @@ class _Reader:
         for layer in loose:
             del draft.bodies[layer]
             draft.ground = "" if layer == draft.ground else draft.ground
-            what = "has no joint with another layer and is left out"
-            draft.warn("exchange.loose", f"links.{layer}", what, "draw its joints")
+            draft.lose("layer without a joint with another", layer)
         self._names()
 
     def _add(self, kind: str, links: tuple[str, str], number: int, comment: str, axis: Array | None = None) -> Pair:

@@ -39,31 +39,29 @@ LARGEST = 200_000_000  # bytes of a file that is read
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: its name, the module in `exchange`, whether it is read and written, what it needs installed."""
+    """A file format: its name, and the modules in `exchange` that read and write it; empty if none does."""
 
     name: str
-    module: str
-    reads: bool = True
-    writes: bool = True
-    needs: str = ""
+    reads: str = ""
+    writes: str = ""
 
 
 FORMATS: dict[str, Format] = {
-    ".mjcf": Format("MJCF", "mjcf", needs="defusedxml"),
-    ".sdf": Format("SDF", "sdf", needs="defusedxml"),
-    ".urdf": Format("URDF", "urdf", needs="defusedxml"),
-    ".step": Format("STEP", "step"),
-    ".stp": Format("STEP", "step"),
-    ".dxf": Format("DXF", "dxf"),
-    ".stl": Format("STL", "mesh", writes=False),
-    ".3mf": Format("3MF", "mesh", writes=False),
-    ".glb": Format("glTF", "glb"),
-    ".fcstd": Format("FreeCAD", "freecad", writes=False),
-    ".pmks": Format("PMKS+", "pmks", writes=False),
-    ".url": Format("PMKS+", "pmks", writes=False),
-    ".txt": Format("PMKS+", "pmks", writes=False),
-    ".json": Format("pylinkage", "pylinkage", writes=False),
-    ".fmu": Format("FMU", "fmu", reads=False),
+    ".mjcf": Format("MJCF", "mjcf", "mjcf"),
+    ".sdf": Format("SDF", "sdf", "sdf"),
+    ".urdf": Format("URDF", "urdf", "urdf"),
+    ".step": Format("STEP", "step", "step"),
+    ".stp": Format("STEP", "step", "step"),
+    ".dxf": Format("DXF", "dxf", "drawing"),
+    ".stl": Format("STL", "mesh"),
+    ".3mf": Format("3MF", "mesh"),
+    ".glb": Format("glTF", "mesh", "glb"),
+    ".fcstd": Format("FreeCAD", "freecad"),
+    ".pmks": Format("PMKS+", "pmks"),
+    ".url": Format("PMKS+", "pmks"),
+    ".txt": Format("PMKS+", "pmks"),
+    ".json": Format("pylinkage", "pylinkage"),
+    ".fmu": Format("FMU", writes="fmu"),
 }
 
 
@@ -120,10 +118,10 @@ def _readable(path: Path) -> Iterator[None]:
         raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
 
 
-def _module(entry: Format, path: Path) -> Any:
-    """The module of a format; MechanismError that names the extra if a library is missing."""
+def _module(entry: Format, name: str, path: Path) -> Any:
+    """A module of a format; MechanismError that names the extra if a library is missing."""
     try:
-        return import_module(f"trunnion.exchange.{entry.module}")
+        return import_module(f"trunnion.exchange.{name}")
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("trunnion"):
             raise
@@ -183,7 +181,7 @@ def _read(path: Path, options: ImportOptions) -> Draft:
     if not size or size > LARGEST:
         what = "is empty" if not size else f"has {size:,} bytes; at most {LARGEST:,} are read"
         raise MechanismError(Finding(what, file=str(path), remedy="export the mechanism again, with fewer parts"))
-    module = _module(entry, path)
+    module = _module(entry, entry.reads, path)
     try:
         with _readable(path):
             draft: Draft = module.read(path, options)
@@ -256,7 +254,7 @@ def export_model(
     """
     path = Path(path)
     entry = _format_of(path, reads=False)
-    module = _module(entry, path)
+    module = _module(entry, entry.writes, path)
     moves = getattr(module, "MOVES", False)
     if magnify != 1 and not getattr(module, "MAGNIFIES", False):
         what = f"a model in {entry.name} has the mechanism's own places; they are not magnified"

@@ -1,7 +1,6 @@
 """An animated glTF (GLB) of a mechanism for any viewer: a node for each link, its poses as keys over the cycle.
 
-The solids are rods between the joints and cylinders as pins; they show the motion, not the parts. Meshes of a GLB are
-read by `exchange.mesh`.
+The solids are rods between the joints and cylinders as pins; they show the motion, not the parts.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import json
 import math
 import struct
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,10 +19,7 @@ from trunnion.exchange.draft import Array, Draft, Pair, perpendicular
 from trunnion.exchange.skeleton import Positions
 from trunnion.version import __version__
 
-if TYPE_CHECKING:
-    from trunnion.exchange.formats import ImportOptions
-
-__all__ = ["MOVES", "read", "write"]
+__all__ = ["MOVES", "write"]
 
 MOVES = True  # it takes the whole cycle
 MAGNIFIES = True
@@ -33,13 +29,6 @@ COLOURS = [(0.45, 0.47, 0.5), (0.84, 0.37, 0.0), (0.0, 0.45, 0.7), (0.0, 0.62, 0
            (0.9, 0.62, 0.0), (0.34, 0.71, 0.91)]  # fmt: skip
 FLOAT, INDEX = 5126, 5125  # component types of glTF: float32, unsigned int32
 Z_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]  # turns a model whose z is up to glTF, whose y is
-
-
-def read(path: Path, options: ImportOptions) -> Draft:
-    """The bodies of a GLB, as `mesh.read`."""
-    from trunnion.exchange.mesh import read as read_meshes
-
-    return read_meshes(path, options)
 
 
 def write(positions: Positions, path: Path) -> list[Finding]:

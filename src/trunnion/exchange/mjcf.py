@@ -58,11 +58,10 @@ def read(path: Path, options: ImportOptions) -> Draft:
     reader.find_drives()
     for tag in ("contact", "tendon"):
         for part in root.iterfind(f"{tag}/*"):
-            reader.lost[tag].append(part.get("name", part.tag))
+            draft.lose(tag, part.get("name", part.tag))
     for tag in BRINGS:
-        if count := sum(1 for _ in root.iter(tag)):
-            what = f"{count} of <{tag}> and the bodies in it are not read"
-            draft.warn("exchange.brings", "", what, "save the model by MuJoCo, which writes it in full")
+        if root.find(f".//{tag}") is not None:
+            draft.lose(f"<{tag}> and the bodies in it, which MuJoCo writes in full when it saves the model")
     return reader.settled(WORLD, options.ground)
 
 
@@ -175,7 +174,7 @@ class _Reader(Scene):
     def _note_lost(self, tag: str, values: Mapping[str, str], name: str) -> None:
         for key in IGNORED[tag]:
             if values.get(key, "0").strip() not in ("0", "false"):
-                self.lost[key].append(name)
+                self.draft.lose(key, name)
 
     # Frames and masses
 
@@ -213,7 +212,8 @@ class _Reader(Scene):
         """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
         draft, source = self.draft, self.compiler.get("inertiafromgeom", "auto")
         bodies = draft.bodies
-        self.lost["shape"] += [name for name in self.geoms if name != WORLD]
+        if shaped := [name for name in self.geoms if name != WORLD]:
+            draft.lose("shape", *shaped)
         low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
         unknown = []
         for name, geoms in self.geoms.items() if source != "false" else ():
@@ -241,7 +241,7 @@ class _Reader(Scene):
             values = self._with_defaults(part, "main")
             name = values.get("name") or f"loop{number + 1}"
             if values.get("active") == "false":
-                self.lost["equality that is not active"].append(name)
+                draft.lose("equality that is not active", name)
             elif part.tag in ("connect", "weld"):
                 links, place = self._ends(values, f"equality {name}")
                 if part.tag == "weld":
@@ -252,7 +252,7 @@ class _Reader(Scene):
                 _, ratio, *higher = numbers(values.get("polycoef"), f"polycoef of {name}", 5, (0, 1, 0, 0, 0))
                 self.couplings.append((values["joint1"], values["joint2"], 0.0 if any(higher) else float(ratio)))
             else:
-                draft.warn("exchange.equality", name, f"is an equality of the kind {part.tag!r}, which is not read")
+                draft.lose(f"equality of the kind {part.tag!r}", name)
         for links, points in shared.items():
             offsets = np.array([place for _, place in points]) - points[0][1]
             rank = int((np.linalg.svd(offsets, compute_uv=False) > APART).sum())
@@ -297,7 +297,7 @@ class _Reader(Scene):
             values = self._with_defaults(part, "main")
             joint, rate = values.get("joint", values.get("jointinparent")), 0.0
             if joint not in self.draft.pairs:
-                self.lost["actuator"].append(values.get("name", part.tag))
+                self.draft.lose("actuator", values.get("name", part.tag))
                 continue
             if part.tag == "velocity" and number < len(control):
                 gear = numbers(values.get("gear"), f"gear of {joint}", 0, (1,))[0]

@@ -174,11 +174,9 @@ def _draft(text: str, file: str) -> Draft:
     if weighed and not settings["flags"] & WEIGHTLESS:
         draft.gravity = np.array([0.0, -9.81, 0.0])
     if forces:
-        draft.note("exchange.forces", "loads", f"{len(forces)} forces are not read", "state them as loads")
-    lost = [entry for entry in extras if entry[0] not in "PJLFCSK"]
-    if lost:
-        what = f"{len(lost)} records are not read, such as gears and holds"
-        draft.warn("exchange.extras", "", what, "add them to the model")
+        draft.lose(f"{len(forces)} forces")
+    if lost := [entry for entry in extras if entry[0] not in "PJLFCSK"]:
+        draft.lose(f"{len(lost)} records such as gears and holds")
     return draft
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, counted
+from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.brep import Face, Moments, Solid
 from trunnion.exchange.draft import Array, Body, Draft, free_name
 from trunnion.exchange.formats import MATERIALS
@@ -122,9 +122,7 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
         solids_here, surfaces = assembly.solids(leaf.definition)
         solids += [(leaf, solid, leaf.place @ place) for solid, place in solids_here]
         if surfaces or not (solids_here or leaf.children):
-            what = f"has {counted(surfaces, 'surface body', 'surface bodies')} or meshes, which are left out"
-            what = what if surfaces else "has no solid and is left out"
-            draft.warn("exchange.surfaces", f"links.{leaf.name or 'part'}", what, "export it as a solid")
+            draft.lose("surfaces and meshes" if surfaces else "parts without a solid", leaf.name or "part")
     return solids
 
 

@@ -52,12 +52,10 @@ VARIABLES = {
     "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not, or if the interval is wider than the value itself"),
     "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
     "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
-    "singular_value": Variable(
-        PARAMETER, "1", "singular value of the derivatives with columns scaled to 1, the largest first"
-    ),
+    "singular_value": Variable(PARAMETER, "1", "singular value of the derivatives, columns scaled to 1; largest first"),
     "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
     "sensor_size": Variable(
-        SENSOR, "of the sensor", "its standard uncertainty as stated, of the angle rad; NaN if it differs"
+        SENSOR, "of the sensor", "stated standard uncertainty, of the angle rad; NaN if it differs"
     ),
     "sensor_uncertainty": Variable(SENSOR, "1", "standard uncertainty of that, in those stated"),
     "rms_before": Variable(BLOCK, "of the channel", "root mean square of the residual at the start"),
@@ -67,13 +65,9 @@ VARIABLES = {
     "left_out": Variable(BLOCK, "1", "positions with data that are not used", np.int32),
     "turns": Variable(BLOCK, "1", "turns used", np.int32),
     "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
-    "held_out_before": Variable(
-        BLOCK, "of the channel", "root mean square of the residual of the held-out data, at the start values"
-    ),
+    "held_out_before": Variable(BLOCK, "of the channel", "rms of the residual of the held-out data, at the start"),
     "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
-    "held_out_expected": Variable(
-        BLOCK, "of the channel", "its expected value from the scatter and the uncertainty of the prediction"
-    ),
+    "held_out_expected": Variable(BLOCK, "of the channel", "its expected value, by scatter and prediction"),
     "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
     "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
     "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
@@ -256,13 +250,10 @@ def dataset(identified: Identified) -> xr.Dataset:
         "hold_out_ratio": np.asarray(identified.hold_out_ratio),
     }
     labels = {
-        "parameter": names,
-        "parameter_2": names,
-        "source": list(spread.parts),
-        "sensor": [error.name for error in fit.sensors],
-        "channel": list(model.measures),
+        "parameter": names, "parameter_2": names, "source": list(spread.parts),
+        "sensor": [error.name for error in fit.sensors], "channel": list(model.measures),
         "condition": [condition.name for condition in conditions],
-    }
+    }  # fmt: skip
     ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in identified.cycles]
     attributes = {
         "name": mechanism.name,

@@ -21,22 +21,12 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identification.fit import (
-    Block,
-    Evaluations,
-    Fit,
-    refined,
-    sensor_errors,
-    solved,
-)
+from trunnion.rig.identification.fit import Block, Evaluations, Fit, refined, sensor_errors, solved
 from trunnion.rig.identification.result import Identified, dataset
 from trunnion.rig.identification.signals import Model, Parameters, described, unknowns
 from trunnion.rig.identification.uncertainty import inseparable, spread_of
 from trunnion.rig.modelled import each, in_condition, measure_of, refuse_unit, same_cycle
-from trunnion.rig.reading.measurement import (
-    Condition,
-    Measurement,
-)
+from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 

@@ -7,19 +7,16 @@ layers, and whatever could be read in two ways is a finding.
 from __future__ import annotations
 
 import itertools
-import logging
 import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from logging.handlers import BufferingHandler
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ezdxf import recover
-from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
 
 from trunnion.errors import Finding, MechanismError
@@ -148,18 +145,12 @@ def _document(path: Path, draft: Draft) -> Drawing:
     if objects > MOST_OBJECTS:
         what = f"holds some {objects:,} objects; at most {MOST_OBJECTS:,} are read"
         raise MechanismError(Finding(what, file=str(path), remedy="export the skeleton alone"))
-    heard, logger = BufferingHandler(MOST_OBJECTS), logging.getLogger("ezdxf")
-    logger.addHandler(heard)
-    try:
-        return readfile(path)
-    except SPOILT:
-        document, _ = recover.readfile(path)
-        mended = "; ".join(record.getMessage() for record in heard.buffer[:3])
-        what = "is damaged; what could be mended is read" + (f": {mended}" if mended else "")
+    document, auditor = recover.readfile(path)
+    if auditor.has_errors or auditor.has_fixes:
+        mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
+        what = f"is damaged; what could be mended is read: {mended}"
         draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
-        return document
-    finally:
-        logger.removeHandler(heard)
+    return document
 
 
 def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:

@@ -802,5 +802,5 @@ def test_a_piston_in_its_bore_slides(tmp_path):
     pair = joint(draft, "frame", "piston")
     assert pair.type == "prismatic"
     np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.012, 0.01202, 0.03], atol=1e-12)
-    assert codes(draft) == {"drive", "rigid", "slides"}
+    assert codes(draft) == {"drive", "rigid"}
     assert (trunnion.analyse(model(draft, tmp_path), 12)["status"].values <= 2).all()

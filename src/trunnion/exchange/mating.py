@@ -566,7 +566,6 @@ class _Held:
 
     def _turning(self, left: str, other: str, contacts: list[Contact]) -> Pair:
         """The pair of pins on one axis, or on several parallel ones that only slide."""
-        draft = self.draft
         axis = contacts[0].hole.axis
         stops = self.stops(left, other, axis)
         if len(self.lines(contacts)) > 1:
@@ -575,24 +574,10 @@ class _Held:
         elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
             pair = _pair("prismatic", contacts)
             pair.comments.append("its axis lies in the plane of the mechanism: it slides")
-            what = f"the pin between {left} and {other} lies in the plane of the mechanism: it slides and does not turn"
-            draft.note("exchange.slides", f"links.{other}", what, "draw end faces that hold it if it turns")
         else:
             pair = _pair("revolute" if stops == 2 or self.plane is not None else "cylindrical", contacts)
             if stops < 2:
                 pair.comments.append(f"end faces hold it in {('neither direction', 'one direction only')[stops]}")
-        sizes = {round(contact.pin.radius / NEAR) for contact in contacts}
-        plays = {round(contact.play / 1e-9) for contact in contacts}
-        if len(sizes) > 1 or len(plays) > 1:
-            what = f"has {len(contacts)} bearings of different sizes; the joint has those of the longest"
-            draft.warn("exchange.bearings", f"joints.{left}-{other}", what, "see the comments of the joint")
-        if stops == 1 and pair.type == "cylindrical":
-            what = f"the pin between {left} and {other} is held in one direction only: the joint is cylindrical"
-            draft.warn("exchange.stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
-        apart = max(_eccentricity(contact) for contact in contacts)
-        if apart > NEAR:
-            what = f"pin and hole between {left} and {other} lie {1e3 * apart:.3g} mm apart; the joint is at the hole"
-            draft.note("exchange.eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
         return pair
 
     def _sliding(self, left: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
@@ -641,9 +626,3 @@ def _pair(kind: str, contacts: list[Contact]) -> Pair:
         over = f", over {1e3 * (contact.high - contact.low):.9g} mm" if contact.high > contact.low else ""
         pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")
     return pair
-
-
-def _eccentricity(contact: Contact) -> float:
-    """Distance of a pin's axis from its hole's, m."""
-    off = contact.pin.point - contact.hole.point
-    return float(np.linalg.norm(off - (off @ contact.hole.axis) * contact.hole.axis))

@@ -29,7 +29,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import joined, number, readable
 from trunnion.rig.judge import Verdict, judge, probability
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
-from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, load_joints, pairs_of
+from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, pairs_of
 from trunnion.rig.reading.timebase import gathered
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
@@ -172,10 +172,9 @@ def _compared(
     mechanism: Mechanism, condition: Condition, measures: Mapping[str, str], coverage: float, method: FrictionMethod
 ) -> ConditionComparison:
     measured = {name: what for name, what in measures.items() if name in condition.courses}
-    joints = load_joints(mechanism)
+    joints = {name: load.joint for name, load in mechanism.loads.items() if load.joint is not None}
     powers = pairs_of(condition, joints)
-    pairs = (*powers.driven, *powers.loaded) if powers else ()
-    of_powers = {signal.channel: signal.measures for pair in pairs for signal in pair}
+    of_powers = {signal.channel: signal.measures for side in powers or () for pair in side for signal in pair}
     model = modelled(mechanism, condition, measured, method, of_powers)
     without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
     figures: dict[str, dict[str, Any]] = {"": {"phase": condition.phase, "drive": model.drive, "status": model.status}}

@@ -30,7 +30,7 @@ FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 def test_an_unforeseen_exception_is_one_line(
     program: Run, monkeypatch: pytest.MonkeyPatch, fault: BaseException
 ) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise fault
 
     monkeypatch.setattr(analysing, "analysed", broken)
@@ -49,7 +49,7 @@ def test_debug_shows_where(
 ) -> None:
     from trunnion.cli import app as cli
 
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise KeyError("x")
 
     monkeypatch.setattr(analysing, "analysed", broken)

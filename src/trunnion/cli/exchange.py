@@ -55,6 +55,10 @@ def export(
     out: Annotated[Path, Option("--out", "-o", help="The file to write; its extension is the format.")],
     at: Annotated[str | None, Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
     frames: Annotated[int, Option("--frames", help="Number of positions in a file that moves.")] = 120,
+    original: Annotated[
+        str | None,
+        Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
+    ] = None,
     magnify: Annotated[
         float, Option("--magnify", help="Factor of the links' displacements by errors and play: 100.")
     ] = 1.0,
@@ -64,6 +68,6 @@ def export(
 
     mechanism = model.read()
     with model.lines():
-        findings = export_model(mechanism, out, at, frames, magnify)
+        findings = export_model(mechanism, out, at, frames, original, magnify)
     wrote(out)
     end(findings, model.file, every=True)

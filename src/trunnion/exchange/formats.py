@@ -1,7 +1,7 @@
 """The table of file formats: by extension, what reads and what writes them, and the module that does it.
 
 A new format is a module with `read(path, options)`, which returns a Draft, or `write(positions, path)`, and
-an entry here.
+an entry here. One with `write_moved(positions, path, original)` also moves the parts of the file that a model is of.
 """
 
 from __future__ import annotations
@@ -232,6 +232,7 @@ def export_model(
     path: str | os.PathLike[str],
     at: float | str | None = None,
     frames: int = 120,
+    original: str | os.PathLike[str] | None = None,
     magnify: float = 1.0,
 ) -> list[Finding]:
     """Write a mechanism in the format of another program.
@@ -242,6 +243,7 @@ def export_model(
     path : the file; its extension decides the format.
     at : the position, as for `analyse`; the first of the cycle if not given. Formats that move take the whole cycle.
     frames : number of positions in a format that moves.
+    original : the STEP file that the model was imported from, whose parts are written where they are then.
     magnify : factor of the displacements of the links from the ideal mechanism, in formats that are looked at.
 
     Returns
@@ -263,6 +265,16 @@ def export_model(
         raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
     span = (frames, None) if moves else (FEWEST, at)
     positions = positions_of(mechanism, *span, magnify=magnify)
+    if original is None:
+        with whole(path) as temporary:
+            findings: list[Finding] = module.write(positions, temporary)
+        return findings
+    if not hasattr(module, "write_moved"):
+        raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
+    source = Path(original)
+    reading(source)
+    with _readable(source):
+        source.open("rb").close()
     with whole(path) as temporary:
-        findings: list[Finding] = module.write(positions, temporary)
+        findings = module.write_moved(positions, temporary, source)
     return findings

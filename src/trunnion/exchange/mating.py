@@ -18,7 +18,7 @@ import numpy as np
 from trunnion.errors import MechanismError
 from trunnion.exchange.brep import Face
 from trunnion.exchange.draft import Array, Draft, Pair, free_name, perpendicular
-from trunnion.joints.fits import limits
+from trunnion.joints.fits import fit, limits
 
 __all__ = ["joined"]
 
@@ -26,6 +26,7 @@ ANGLE = 1e-4  # rad, between axes or planes that count as parallel
 NEAR = 1e-6  # m, between places that count as equal
 COVERED = 0.55, 0.45  # of a turn: a hole that holds its pin; one that may
 THREAD = 0.2  # of the radius: a pin that much larger than its hole is pressed or threaded in
+FITS = ("H7/h6", "H7/g6", "H7/f7", "H8/f7", "H8/e8", "H9/d9", "H11/c11")
 TRIED = 24  # directions of edges for the least box around a face
 ALIKE = 3  # of the gap: the difference of radii up to which a pin without a joint is spoken of
 
@@ -176,6 +177,7 @@ def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
     contacts = _contacts(draft, groups, rounds["cylinder"], gap)
     balls = _contacts(draft, groups, rounds["sphere"], gap)
     facings = list(_facings(faces, gap))
+    _slots(draft, faces, rounds["cylinder"], gap)
     mechanism = _Held(draft, groups, contacts, balls, facings)
     mechanism.patterns(rounds["cylinder"])
     while mechanism.step():
@@ -290,6 +292,30 @@ def _planes(faces: dict[str, list[Face]]) -> list[tuple[str, Array, float, Array
             normal = face.axis if face.outward else -face.axis
             planes.append((body, normal, float(face.outline[0] @ normal), face.outline))
     return planes
+
+
+def _slots(draft: Draft, faces: dict[str, list[Face]], rounds: Sequence[Round], gap: float) -> None:
+    """Say which pins lie between two walls of another body: pins in slots, which are no joints of a model."""
+    planes = _planes(faces)
+    all_normals, levels = np.array([plane[1] for plane in planes]).reshape(-1, 3), np.array([p[2] for p in planes])
+    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
+        walls: dict[str, list[Array]] = defaultdict(list)
+        middle = pin.point + (pin.low + pin.high) / 2 * pin.axis
+        distances = all_normals @ middle - levels - pin.radius
+        near = (abs(all_normals @ pin.axis) < ANGLE) & (distances >= -NEAR) & (distances <= gap)
+        for body, normal, _, outline in (planes[index] for index in np.nonzero(near)[0]):
+            if body == pin.body:
+                continue
+            across = np.cross(pin.axis, normal)
+            low, high = (float(part) for part in ((outline @ across).min(), (outline @ across).max()))
+            along = (outline - pin.point) @ pin.axis
+            if low <= middle @ across <= high and along.max() > pin.low + NEAR and along.min() < pin.high - NEAR:
+                walls[body].append(normal)
+        for body, normals in walls.items():
+            if any(float(left @ other) < -1 + ANGLE for left, other in combinations(normals, 2)):
+                what = f"{pin.label} lies in a slot of {body}, which is no joint of a model"
+                remedy = f"add a massless link that turns on the pin and slides in {body}"
+                draft.warn("exchange.slot", f"links.{pin.body}", what, remedy)
 
 
 def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
@@ -625,4 +651,20 @@ def _pair(kind: str, contacts: list[Contact]) -> Pair:
     for contact in contacts:
         over = f", over {1e3 * (contact.high - contact.low):.9g} mm" if contact.high > contact.low else ""
         pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")
+    if kind in ("revolute", "cylindrical"):
+        pair.comments.append(_nearest_fit(main))
     return pair
+
+
+def _nearest_fit(contact: Contact) -> str:
+    """The usual fit whose mean play is nearest to that drawn, in words."""
+    size = round(2e3 * contact.hole.radius, 1) * 1e-3
+    try:
+        fits = {name: fit(size, *name.split("/")) for name in FITS}
+    except MechanismError:
+        return "no ISO fit for its size"
+    play = 2 * contact.play
+    name = min(fits, key=lambda name: abs(fits[name].mean - play))
+    drawn = "no play is drawn" if play == 0 else f"play {1e6 * play:.4g} µm on the diameter"
+    span = f"{1e6 * fits[name].minimum:.4g} to {1e6 * fits[name].maximum:.4g} µm"
+    return f"{drawn}; nearest usual fit: {1e3 * size:.6g} mm {name}, {span}"

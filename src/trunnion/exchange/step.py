@@ -1,6 +1,6 @@
 """STEP files (ISO 10303-21, AP203 to AP242): solids become links, their pins, holes and guides joints.
 
-Written is the skeleton of a mechanism at a position.
+Written are the skeleton of a mechanism at a position, or the parts of the file that it came from, moved there.
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.brep import Face, Moments, Solid
 from trunnion.exchange.draft import Array, Body, Draft, free_name
-from trunnion.exchange.formats import MATERIALS
+from trunnion.exchange.formats import MATERIALS, ImportOptions
 from trunnion.exchange.mating import joined
-from trunnion.exchange.model_file import complete
+from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.part21 import Part21, quoted
 from trunnion.exchange.step_assembly import Assembly, Occurrence, Place
 
 if TYPE_CHECKING:
-    from trunnion.exchange.formats import ImportOptions
     from trunnion.exchange.skeleton import Positions
 
-__all__ = ["read", "write"]
+__all__ = ["read", "write", "write_moved"]
 
 MAGNIFIES = True
 PATIENCE = 60.0  # s, for the mesh of a free-form solid
 DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and angle, rad
 SIZE = 0.02  # of the mechanism: length of an axis of a skeleton that has no bearing
+FIT = 1e-6  # of the size: between the points of a model and of the file it is moved in
 Entry = tuple[Occurrence, Solid, Place]  # the part that a solid belongs to, and its place in the whole
 BROKEN = (IndexError, KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError, OverflowError)
 
@@ -55,6 +55,11 @@ def read(path: Path, options: ImportOptions) -> Draft:
     ------
     MechanismError : if it is no STEP file, is cut off, too large or has no solids.
     """
+    return _opened(path, options)[0]
+
+
+def _opened(path: Path, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:
+    """The draft of a file, with the occurrence that each body comes from."""
     file = Part21(path)
     try:
         return _drafted(file, options)
@@ -65,7 +70,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
         raise file.unreadable(what) from None
 
 
-def _drafted(file: Part21, options: ImportOptions) -> Draft:
+def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:
     assembly = Assembly(file, options.unit)
     links = assembly.tree()
     name = links[0].name if len(links) == 1 else ""
@@ -73,7 +78,7 @@ def _drafted(file: Part21, options: ImportOptions) -> Draft:
         top = links[0]
         itself = [replace(top, children=[])] if assembly.solids(top.definition)[0] else []
         links = itself + top.children
-    draft, faces, tolerances = Draft(name), {}, assembly.tolerances()
+    draft, faces, parts, tolerances = Draft(name), {}, {}, assembly.tolerances()
     for link in links:
         solids = _solids(assembly, link, draft)
         label = link.name or "part"
@@ -87,14 +92,14 @@ def _drafted(file: Part21, options: ImportOptions) -> Draft:
             groups = [(label, solids)] if solids else []
         for text, entries in groups:
             body = _body(assembly, free_name(text, draft.bodies), entries, options, draft)
-            draft.bodies[body.name] = body
+            draft.bodies[body.name], parts[body.name] = body, link
             faces[body.name] = [
                 replace(face, tolerance=tolerances.get(face.number, ""))
                 for _, solid, place in entries
                 for face in _placed(solid.faces, place)
             ]
             if len(entries) > 1:
-                _rigid(draft, body.name, link, entries, options)
+                _rigid(draft, body.name, link, entries)
     if not draft.bodies:
         meshes = file.of("TESSELLATED_SOLID") or file.of("SHELL_BASED_SURFACE_MODEL")
         what = "has surfaces or meshes, but no solids" if meshes else "has no solids"
@@ -112,7 +117,7 @@ def _drafted(file: Part21, options: ImportOptions) -> Draft:
     if not draft.pairs and len(draft.bodies) > 1:
         what = "no pin lies in a hole and no two walls guide a part: there are no joints"
         draft.warn("exchange.joints", "", what, "state a larger --gap, or the unit with --unit")
-    return draft
+    return draft, assembly, parts
 
 
 def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
@@ -126,7 +131,7 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
     return solids
 
 
-def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry], options: ImportOptions) -> None:
+def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry]) -> None:
     """Say that several solids are taken as one rigid link."""
     kind = "sub-assembly" if link.children else "part"
     what = f"is a {kind} of {len(entries)} solids, taken as one rigid link"
@@ -323,14 +328,18 @@ def write(positions: Positions, path: Path) -> list[Finding]:
         use = text(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE({quoted(name)},{quoted(name)},'',#{root[0]},#{definition},$)")
         shape = text(f"PRODUCT_DEFINITION_SHAPE('','',#{use})")
         moved = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{origin},#{drawn})")
-        relation = text(
-            f"(REPRESENTATION_RELATIONSHIP('','',#{representation},#{root[1]})"
-            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{moved})SHAPE_REPRESENTATION_RELATIONSHIP())"
-        )
+        relation = text(_relation(representation, root[1], moved))
         text(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
     path.write_text(text.text(), encoding="ascii")
     draft.note("exchange.skeleton", "", "points, axes and lines are written, without masses, joints and friction")
     return draft.findings
+
+
+def _relation(first: int, second: int, operator: int) -> str:
+    return (
+        f"(REPRESENTATION_RELATIONSHIP('','',#{first},#{second})"
+        f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{operator})SHAPE_REPRESENTATION_RELATIONSHIP())"
+    )
 
 
 def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) -> list[int]:
@@ -353,3 +362,90 @@ def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) ->
         if np.linalg.norm(end - start) > 0
     ]
     return [text(f"GEOMETRIC_CURVE_SET({quoted(body.name)},({_numbers(points + curves)}))")]
+
+
+def write_moved(positions: Positions, path: Path, original: Path) -> list[Finding]:
+    """Write the file that a model was imported from, with the parts of its links where they are at a position."""
+    draft, assembly, parts = _opened(original, ImportOptions(ground=positions.mechanism.fixed_link))
+    file = assembly.file
+    turn = _model_frame(positions, draft)
+    changes: dict[int, str] = {}
+    text = _Text(max(file.spans) + 1)
+    links = _links_of(draft, positions)
+    for name, part in parts.items():
+        link = links.get(name, "")
+        if not link:
+            what = f"is a part of {original.name!r} and no link of the model"
+            remedy = "--from takes what the usual --gap and --unit read; import it with these"
+            raise MechanismError(Finding(what, f"links.{name}", remedy))
+        rotation, origin = positions.rotations[link][0], positions.origins[link][0]
+        if not np.isfinite(rotation).all():
+            what = f"has no solution at {positions.drive(0)}"
+            raise MechanismError(Finding(what, "--at", "choose another position; `trunnion analyse` says why"))
+        move = Place(turn.T @ rotation @ turn, turn.T @ origin)
+        if part.relation:
+            _move(assembly, part, move, text, changes)
+        elif np.abs(move.matrix - np.eye(3)).max() > FIT or np.abs(move.shift).max() > FIT:
+            what = f"has no placement of its own in {original.name!r}"
+            raise MechanismError(Finding(what, f"links.{name}", "export the parts from CAD as an assembly"))
+    pieces, at = [], 0
+    for number in sorted(changes, key=lambda number: file.spans[number]):
+        start, end = file.spans[number]
+        pieces += [file.text[at:start], changes[number]]
+        at = end
+    rest = file.text[at:]
+    close = rest.rindex("ENDSEC")
+    added = "\n".join(text.lines)
+    path.write_text("".join(pieces) + rest[:close] + added + "\n" + rest[close:], encoding="utf-8")
+    return []
+
+
+def _move(assembly: Assembly, part: Occurrence, move: Place, text: _Text, changes: dict[int, str]) -> None:
+    """Write a new placement of a part, and change the relation that states it."""
+    file = assembly.file
+    entity = file[part.relation]
+    operator = entity["REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION"][0]
+    first, second = entity["REPRESENTATION_RELATIONSHIP"][2:4]
+    inner = part.parent.inverse @ move @ part.place  # the part's new place in its parent
+    if not part.forward:
+        inner = inner.inverse
+    if file.kind(operator) != "ITEM_DEFINED_TRANSFORMATION":
+        what = f"places {part.name!r} by an operator, which is not rewritten"
+        raise file.unreadable(what, "export it again as AP214")
+    start = file[operator]["ITEM_DEFINED_TRANSFORMATION"][2]
+    end = text.placement(inner @ assembly.frame(start, first), assembly.geometry(second).length)
+    new = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{start},#{end})")
+    changes[part.relation] = _relation(first, second, new)
+
+
+def _links_of(draft: Draft, positions: Positions) -> dict[str, str]:
+    """The link of the model that each part of the file belongs to: its own, or that of a part fixed to it."""
+    groups = {name: {name} for name in draft.bodies}
+    for pair in (pair for pair in draft.pairs.values() if pair.type == "fixed"):
+        united = groups[pair.links[0]] | groups[pair.links[1]]
+        groups.update(dict.fromkeys(united, united))
+    return {
+        name: link for name, group in groups.items() for link in positions.mechanism.effective_links if link in group
+    }
+
+
+def _model_frame(positions: Positions, draft: Draft) -> Array:
+    """The rotation from the file to the model; MechanismError if the model's links do not have the file's points.
+
+    The model's links must have the file's frame, as the import wrote them: only then is their motion that of the parts.
+    """
+    spatial = positions.mechanism.space == "spatial"
+    drawn = complete(draft, positions.mechanism.fixed_link if positions.mechanism.fixed_link in draft.bodies else "")
+    normal = None if spatial else drawn.plane_normal()
+    turn = np.eye(3) if normal is None else flat_frame(normal)
+    values: Any = positions.mechanism.parameters()
+    size = max((float(np.linalg.norm(pair.at)) for pair in drawn.pairs.values()), default=1.0)
+    for pair in drawn.pairs.values():
+        for link in pair.links:
+            for axis, place in zip("xyz" if spatial else "xy", turn @ pair.at, strict=False):
+                value = values.get(f"links.{link}.points.{pair.name}.{axis}")
+                value = values.get(f"links.{link}.points.{pair.name}.at.{axis}") if value is None else value
+                if value is None or abs(float(np.ravel(value)[0]) - place) > FIT * size:
+                    what = f"has other points than the file it is to move: {pair.name}"
+                    raise MechanismError(Finding(what, f"links.{link}", "import the file again, and keep its points"))
+    return turn

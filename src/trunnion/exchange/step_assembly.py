@@ -40,11 +40,18 @@ class Place:
 
 @dataclass
 class Occurrence:
-    """A use of a product in an assembly: its own name, its place in the whole, and the parts in it."""
+    """A use of a product in an assembly: its own name, its place in the whole, and the parts in it.
+
+    relation: the entity that holds its placement in its parent; 0 if it has none; forward: whether from it to the
+    parent. parent: place of the parent.
+    """
 
     name: str
     definition: int
     place: Place
+    relation: int = 0
+    forward: bool = True
+    parent: Place = field(default_factory=Place)
     children: list[Occurrence] = field(default_factory=list)
 
     def parts(self) -> Iterator[Occurrence]:
@@ -124,8 +131,9 @@ class Assembly:
             if occurrence.definition in above:
                 raise self.file.unreadable(f"has the product {occurrence.name!r} inside itself")
             for index, (use, child) in enumerate(self.uses.get(occurrence.definition, [])):
-                place = occurrence.place @ self._placed(use, occurrence.definition, child, index)
-                part = Occurrence(self.name(child), child, place)
+                above_it = occurrence.place
+                inner, relation, forward = self._placed(use, occurrence.definition, child, index)
+                part = Occurrence(self.name(child), child, above_it @ inner, relation, forward, above_it)
                 occurrence.children.append(expanded(part, (*above, occurrence.definition)))
             return occurrence
 
@@ -138,8 +146,8 @@ class Assembly:
         """Whether a shape belongs to a product, not to a feature of it."""
         return isinstance(definition, Ref) and self.file.kind(definition).startswith("PRODUCT_DEFINITION")
 
-    def _placed(self, use: int, parent: int, child: int, index: int) -> Place:
-        """Place of a use in its parent."""
+    def _placed(self, use: int, parent: int, child: int, index: int) -> tuple[Place, int, bool]:
+        """Place of a use in its parent, the relation that states it, and whether that runs from the child."""
         relation = self.places.get(use)
         if relation is None:  # as a mapped item of the parent's shape
             mapped = [
@@ -151,7 +159,7 @@ class Assembly:
             ]
             same = [use for use, other in self.uses[parent][:index] if other == child]
             if len(same) < len(mapped):
-                return mapped[len(same)]
+                return mapped[len(same)], 0, True
             raise self.file.unreadable(f"does not say where {self.name(child)!r} lies in {self.name(parent)!r}")
         entity = self.file[relation]
         operator = entity["REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION"][0]
@@ -162,7 +170,7 @@ class Assembly:
             place = self.frame(end, second) @ self.frame(start, first).inverse
         else:
             place = self.frame(operator, second)
-        return place if forward else place.inverse
+        return (place if forward else place.inverse), relation, forward
 
     def _mapped(self, item: int, shape: int) -> tuple[Place, int]:
         """Place and representation of a mapped item of a shape."""

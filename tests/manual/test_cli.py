@@ -188,8 +188,6 @@ def test_missing_file_folder_and_huge_file(program: Run, tmp_path: Path) -> None
         (["--criterion", "-1"], "criterion"),
         (["--out", "r.ods"], ".csv"),
         (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
-        (["--variables", "reaction_forces"], "reaction_force"),
-        (["--variables", "drive_effort", "--report", "r.html"], "all variables"),
     ],
 )
 def test_bad_options_are_refused_with_a_message(program: Run, tmp_path: Path, options: list[str], word: str) -> None:

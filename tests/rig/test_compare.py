@@ -289,7 +289,7 @@ def test_one_turn_is_no_uncertainty():
     assert np.isfinite(result.rms.values).all()
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "channels.torque", "no position with values from two turns", "warning")
+    assert said(result, "channels.torque", "for lack of values from two turns", "warning")
     assert said(result, "efficiency", "not known in run 1: there is only one turn", "more turns")
 
 

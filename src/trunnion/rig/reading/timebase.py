@@ -161,23 +161,15 @@ def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
     """
     groups: dict[tuple[str, ...], list[Finding]] = {}
     for finding in findings:
-        key = (
-            finding.severity,
-            finding.where.partition(" ")[0],
-            finding.code,
-            finding.remedy,
-            finding.what if same else "",
-        )
-        groups.setdefault(key, []).append(finding)
+        kind, text = finding.where.partition(" ")[0], finding.what if same else ""
+        groups.setdefault((finding.severity, kind, finding.code, finding.remedy, text), []).append(finding)
     merged = []
-    for group in groups.values():
+    for (_, kind, *_), group in groups.items():
         first, files = group[0], list(dict.fromkeys(Path(finding.file).name for finding in group if finding.file))
         if len(group) > 1:
-            where = (
-                first.where if len({finding.where for finding in group}) == 1 else f"{first.where.partition(' ')[0]}s"
-            )
-            named = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
-            what = f"{first.what} — {len(group)} such findings" + (f": {named}" if files else "")
+            where = first.where if len({finding.where for finding in group}) == 1 else f"{kind}s"
+            named = f": {', '.join(files[:4])}" + ", …" * (len(files) > 4) if files else ""
+            what = f"{first.what} — {len(group)} such findings{named}"
             first = replace(first, what=what, where=where, file="", line=None)
         merged.append(first)
     return merged

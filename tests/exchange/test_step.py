@@ -347,6 +347,18 @@ def test_gap_interference_and_threads_are_findings(tmp_path):
     assert {"gap", "touching"} & codes(through)
 
 
+def test_a_part_that_touches_and_a_part_far_away_end_the_search(tmp_path):
+    """The foot is fixed to the frame it stands under, once, and the stray is left out."""
+    parts = slider_crank() | {"foot": (box((-20, -20, -30), (20, 20, -12)), *STILL)}
+    parts["stray"] = (box((0, 0, 0), (10, 10, 10)), np.eye(3), np.array([0, 900, 0]))
+    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
+    assert codes(draft) == {"drive", "touching", "unconnected"}
+    assert len(draft.findings) == 3
+    assert draft.bodies.keys() == {"frame", "crank", "rod", "slider"}
+    alone = import_file(written(tmp_path / "b.step", slider_crank()), ground="frame").bodies["frame"].mass
+    assert draft.bodies["frame"].mass == pytest.approx(alone + STEEL * 0.04 * 0.04 * 0.018, rel=1e-9)
+
+
 def test_a_ball_in_its_socket(tmp_path):
     ball = turned([(0, -30), (4, -30), (4, -3), (5, 0, (0, 0)), (0, 5, (0, 0))])
     hollow = box((-10, -10, -6), (10, 10, 10))

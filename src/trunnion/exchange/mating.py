@@ -546,11 +546,8 @@ class _Held:
                     links.update(dict.fromkeys(united, united))
             main = links[self.groups(draft.ground)] if draft.ground else max(links.values(), key=len)
             apart = [body for body in bodies if body not in main]
-            touching = [
-                (self.groups(facing.bodies[0]), self.groups(facing.bodies[1]))
-                for facing in self.facings
-                if facing.gap <= NEAR and len(main & {self.groups(body) for body in facing.bodies}) == 1
-            ]
+            flush = [tuple(map(self.groups, facing.bodies)) for facing in self.facings if facing.gap <= NEAR]
+            touching = [pair for pair in flush if (pair[0] in main) != (pair[1] in main)]
             if not apart or not touching:
                 break
             left, other = touching[0] if touching[0][0] in main else touching[0][::-1]

@@ -128,7 +128,7 @@ costs:
 """
 
 
-def test_limits_are_written_where_they_stand(program: Run, tmp_path: Path) -> None:
+def test_limits_are_written_under_tolerances(program: Run, tmp_path: Path) -> None:
     """Nothing but the limits is changed, rounded down to five digits: the model that is written keeps its limits."""
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, "--write", "b.yaml")

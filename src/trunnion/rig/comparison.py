@@ -179,11 +179,13 @@ def _compared(
     without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
     figures: dict[str, dict[str, Any]] = {"": {"phase": condition.phase, "drive": model.drive, "status": model.status}}
     signals = {name: replace(condition.courses[name], local=model.left_open.get(name, 0.0)) for name in measured}
+    drive = model.drive if model.unit == "rad" and len(model.drive) > 1 else None
     for name, signal in signals.items():
         course, comparable = model.courses[name], model.comparable(name)
-        figures[name] = judge(signal, course, comparable, model.drive, coverage)
+        slope = np.gradient(course) / np.gradient(model.drive) if drive is not None else np.zeros_like(course)
+        angle = np.nan_to_num(np.hypot(condition.lag * condition.speed, condition.cut) * slope)
+        figures[name] = judge(signal, course, comparable, model.drive, coverage, angle)
         if figures[name]["verdict"] in (Verdict.NOT, Verdict.OFFSET):
-            drive = model.drive if model.unit == "rad" else None
             free = None if model.measures[name].of_motion else without_friction().get(name)
             gap = np.where(comparable, figures[name]["residual"], np.nan)
             for kind, (size, share) in causes(gap, course, signal.accuracy.datum, drive, free).items():
@@ -221,7 +223,7 @@ def causes(
     that goes away with it.
     """
     shapes = {"zero": np.ones_like(model), "gain": model - datum}
-    if drive is not None and len(drive) > 1:
+    if drive is not None:
         shapes["angle"] = np.gradient(model) / np.gradient(drive)
     if frictionless is not None:
         shapes["friction"] = model - frictionless

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import scales_of
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 from trunnion.studies.allocation.problem import Criterion, RowEffects
@@ -81,8 +82,11 @@ def rows_of(
         count = int(np.sum(finite))
         if not count:
             unknown.append(of.measure.name)
-        slopes.append(first.sensitivity.reshape(len(names), -1)[:, finite])
-        spreads.append(spread[..., finite])
+        floor = scales_of(study.run).floor(of.measure.figure_unit(system, values))
+        size = np.abs(spread[2])
+        still = (size > 0) & (size <= floor)  # a slope of rounding would bound a tolerance at kilometres
+        slopes.append(np.where(still, 0.0, first.sensitivity.reshape(len(names), -1))[:, finite])
+        spreads.append(np.where(still, 0.0, spread)[..., finite])
         ends.append(np.repeat(tight.get(of.measure.name, 1.0) * np.array([limits(of)]).T, count, axis=1))
         measure, position, moving = measure + count * [k], position + index[finite].tolist(), moving + count * [moves]
 

@@ -248,3 +248,16 @@ def test_plain_numbers_are_si() -> None:
     also = trunnion.sweep(mechanism, {"O.speed": np.array([50, 75, 100])}, 4)
     assert also["O.speed"].equals(swept["O.speed"])
     assert trunnion.sweep(mechanism, {"r": [0.05]}, 4)["r"].attrs["units"] == "m"
+
+
+def test_a_table_that_closes_at_some_points_alone() -> None:
+    """Its first point comes again where the period is longer than the points."""
+    data = read("durango-fourbar").data()
+    points = [["0 s", "150 N m"], ["0.3 s", "200 N m"], ["0.6 s", "150 N m"]]
+    data["tables"] = {"f": {"over": "time", "points": points, "period": "0.6 s"}}
+    data["loads"]["brake"] = {"link": "rocker", "moment": "-f"}
+    mechanism, path, periods = Mechanism(**data), "tables.f.period", ["0.6 s", "0.62 s", "0.7 s"]
+    together = trunnion.sweep(mechanism, {path: periods}, steps=90)["drive_effort_rms"].values.ravel()
+    each = [trunnion.analyse(mechanism.with_values({path: period}), steps=90) for period in periods]
+    np.testing.assert_allclose(together, [float(result["drive_effort_rms"][0]) for result in each], rtol=1e-9)
+    assert together[1] != together[0]

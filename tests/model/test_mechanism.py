@@ -97,6 +97,8 @@ def test_defaults_are_followed_until_a_joint_has_its_own_value() -> None:
         ("", "there is no number named ''", "known"),
         ("A.initial.place", "there is no number named 'A.initial.place'", ""),
         ("crank.inertia.xx", "there is no number named 'crank.inertia.xx'", ""),
+        ("A.pin.radius.x", "there is no number named 'A.pin.radius.x'", "'A.pin.radius'"),
+        ("crank.mass.x", "there is no number named 'crank.mass.x'", "'crank.mass'"),
     ],
 )
 def test_unknown_names_and_numbers_that_are_not_stated(name: str, what: str, remedy: str) -> None:

@@ -22,6 +22,7 @@ from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.touching import contacts_of
+from trunnion.errors import MechanismError
 from trunnion.joints.contact import CONTACT_LAWS, hertz_stiffness, loss_factor, restitution_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
@@ -226,6 +227,12 @@ def balanced(result: Any) -> bool:
 
 def codes(result: Any) -> list[str]:
     return [one.code for one in result.trunnion.findings]
+
+
+@pytest.mark.parametrize("restitution", [-0.1, 1.1])
+def test_a_restitution_is_from_0_to_1(restitution: float) -> None:
+    with pytest.raises(MechanismError, match=r"S\.contact\.restitution: is .*at most 1"):
+        guide(contact={**RIGID, "restitution": restitution})
 
 
 def test_a_slider_in_its_guide_strikes_closes_and_lifts_off() -> None:

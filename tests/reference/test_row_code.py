@@ -106,6 +106,25 @@ def test_one_code_serves_mechanisms_that_differ_by_numbers(monkeypatch):
     assert len(row_code._recorded) == 1
 
 
+def test_a_table_that_does_not_reach_its_period_is_no_closed_one(monkeypatch):
+    monkeypatch.setattr(row_code, "_recorded", {})
+    text = chain(13).replace("speed: 10 rad/s", "speed: 0.5 rad/s").replace("1 N m", "f")
+    for points in ("[[0 s, 1.5 N m], [5 s, 2 N m], [10 s, 1.5 N m]]", "[[0 s, 1.5 N m], [5 s, 2 N m], [9 s, 4 N m]]"):
+        table = f"tables: {{f: {{over: time, points: {points}, period: 10 s}}}}"
+        run = prepare(Mechanism(**entries_of(f"{text}{table}\n")[0]))
+        time = run.cycle.times(STEPS)
+        with np.errstate(all="ignore"):
+            coded = run.solve(time)
+            monkeypatch.setattr(backward, "MANY_MODULES", 10**9)
+            _same(run.solve(time), coded, time)
+        monkeypatch.setattr(backward, "MANY_MODULES", 12)
+
+
+def test_no_times_are_no_positions():
+    run = prepare(Mechanism(**entries_of(TEXTS["chain"])[0]))
+    assert status_of(run.solve(np.zeros(0)), (0,)).shape == (0,)
+
+
 def test_numpy_solves_until_the_code_is_wanted(monkeypatch):
     run = prepare(Mechanism(**entries_of(chain(14))[0]))
     ran, run_code = [], parts.Parts.run

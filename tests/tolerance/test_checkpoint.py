@@ -58,6 +58,20 @@ def content(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.iterdir()}
 
 
+def test_other_files_in_the_folder_are_no_blocks(begun: Path) -> None:
+    shares: list[float] = []
+    for name in ("notes.npz", "37.npz", "-1.npz"):
+        (begun / name).write_bytes((begun / "0.npz").read_bytes())
+    assert bits(run(ToyJob(), checkpoint=begun, progress=shares.append)[0]) == EXPECTED
+    assert (shares[0], shares[-1]) == (15 / 37, 1.0)
+
+
+@pytest.mark.parametrize("head", ["5", "[]", "null", '"a"', "{", ""])
+def test_a_head_that_is_no_job_is_a_finding(begun: Path, head: str) -> None:
+    (begun / module.HEAD).write_text(head)
+    assert refusal(begun, ToyJob()) == "is no checkpoint"
+
+
 def test_a_finished_run_is_read_only(begun: Path) -> None:
     run(ToyJob(), checkpoint=begun)
     before, shares = content(begun), list[float]()

@@ -194,7 +194,7 @@ class Contact(Part):
     """
 
     law: Annotated[str, _check_contact, _schema_contact, LAW] = "restitution"
-    restitution: Dimensionless | None = None
+    restitution: Annotated[Dimensionless | None, Within(0, 1)] = None
     stiffness: Annotated[AnyQuantity | None, Positive] = None
     exponent: Annotated[Dimensionless | None, Within(1, 10)] = None
     modulus: Annotated[Pressure | None, Positive] = None

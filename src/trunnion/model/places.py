@@ -89,8 +89,11 @@ def _of_key(mechanism: Numbers, name: str) -> Iterator[tuple[str, Location]]:
         place: Location = ("loop", rows.index(str(location[-1]))) if looped else location
         index: tuple[int, ...] = ()
         annotation = field_of(type(part), below)
-        if annotation is None and below[-1:] and below[-1] in "xyz":  # of a direction
+        if annotation is None and below[-1:] and below[-1] in tuple("xyz"):  # of a direction
+            stated = stated_at(mechanism.data(), (*place, *below[:-1]))
             annotation, index = field_of(type(part), below[:-1]), ("xyz".index(below[-1]),)
+            if not isinstance(stated, list) and (stated is not None or not _has_components(annotation)):
+                continue
         if annotation is not None and Friction in part_types(annotation):  # a plain number is the coefficient
             annotation, below = AnyQuantity, [*below, "coefficient"]
         group = stated_at(mechanism.data(), (*place, *below[:-1]))
@@ -111,6 +114,11 @@ def field_of(kind: type[BaseModel], keys: Sequence[str]) -> Any:
         return None
     below = (field_of(part, keys[1:]) for part in part_types(fields[keys[0]]))
     return fields[keys[0]] if len(keys) == 1 else next((inner for inner in below if inner is not None), None)
+
+
+def _has_components(annotation: Any) -> bool:
+    """Whether a field is a row of quantities, or may be one of several forms that is."""
+    return get_origin(annotation) is tuple or any(map(_has_components, get_args(annotation)))
 
 
 def _is_number(annotation: Any) -> bool:

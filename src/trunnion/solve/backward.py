@@ -188,6 +188,7 @@ def _by_code(
     usual = method.name == "newton" and method.limit == FrictionMethod.limit
     if (
         np.ndim(time) != 1
+        or np.size(time) == 0
         or any(vars(conditions).values())
         or not (usual and method.criterion is None and method.multiple is None)
     ):

@@ -21,9 +21,9 @@ from trunnion.solve.forward import Assembly, Forward, Vector, forward, start
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "NOTHING_USEFUL", "STATE_USEFUL", "LoadAction", "Share", "SpringState", "Stated", "Switch", "has_useful_work",
-    "losses", "placed", "spring_state", "springs", "stated_loads", "stated_walk", "useful_loads", "useful_powers",
-    "useful_springs", "useful_weights",
+    "NOTHING_USEFUL", "STATE_USEFUL", "LoadAction", "Share", "SpringState", "Stated", "Switch", "closes",
+    "has_useful_work", "losses", "placed", "spring_state", "springs", "stated_loads", "stated_walk", "useful_loads",
+    "useful_powers", "useful_springs", "useful_weights",
 ]  # fmt: skip
 
 
@@ -146,12 +146,16 @@ class Stated:
         mechanism, numbers, path = self.walk.system.mechanism, self.walk.values, f"tables.{name}.points"
         table, last = mechanism.tables[name], len(mechanism.tables[name].points) - 1
         knots, values = ([numbers[f"{path}.{k}.{key}"] for k in range(last + 1)] for key in ("at", "value"))
-        if table.period is not None:
-            paths = (f"{path}.0.at", f"{path}.{last}.at", f"tables.{name}.period")
-            first, end, period = (mechanism.parameter_set.nominal[path] for path in paths)
-            if end - first < period * (1 - 1e-9):  # the first point comes again as the last
-                knots, values = [*knots, knots[0] + numbers[f"tables.{name}.period"]], [*values, values[0]]
+        if table.period is not None and not closes(mechanism, name):  # the first point comes again as the last
+            knots, values = [*knots, knots[0] + numbers[f"tables.{name}.period"]], [*values, values[0]]
         return knots, values, self.walk.time if table.over == "time" else self._drive[0]
+
+
+def closes(mechanism: Mechanism, name: str) -> bool:
+    """Whether the points of a table reach over all of its period, and the last is its first again."""
+    nominal, last = mechanism.parameter_set.nominal, len(mechanism.tables[name].points) - 1
+    first, end = (nominal[f"tables.{name}.points.{k}.at"] for k in (0, last))
+    return bool(end - first >= nominal.get(f"tables.{name}.period", np.inf) * (1 - 1e-9))
 
 
 def placed(mechanism: Mechanism) -> bool:

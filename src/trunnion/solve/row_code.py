@@ -25,6 +25,7 @@ from trunnion.engines.kernel import STRUCTURAL, TIME, literals
 from trunnion.engines.parts import Parts
 from trunnion.engines.recorded import Recorded
 from trunnion.solve.forward import Assembly, Forward, SpatialWalk, forward
+from trunnion.solve.loads import closes
 from trunnion.solve.system import System, Values
 
 __all__ = ["RowCode", "code_of", "leaves_of"]
@@ -102,7 +103,8 @@ def _form(system: System) -> str:
         return 0 if stated or (isinstance(entry, (int, float)) and not isinstance(entry, bool)) else entry
 
     entries = masked(system.mechanism.model_dump(mode="json"))
-    return json.dumps({key: entry for key, entry in entries.items() if key not in ("name", "assembly")})
+    closed = [closes(system.mechanism, name) for name in system.mechanism.tables]  # of numbers, and compiled in
+    return json.dumps([closed, {key: entry for key, entry in entries.items() if key not in ("name", "assembly")}])
 
 
 class RowCode:

@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import lru_cache, partial
 from io import BytesIO
 from itertools import islice
@@ -252,20 +252,18 @@ class Checkpoint:
             _write(folder / HEAD, json.dumps(now).encode())
         try:
             before = json.loads((folder / HEAD).read_bytes())
-        except (FileNotFoundError, ValueError):
+            differing = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
+        except (FileNotFoundError, ValueError, TypeError, AttributeError):  # no text, no JSON, or not of a job
             remedy = "name the folder that the run was begun with, or another for a new run"
             raise MechanismError(Finding("is no checkpoint", str(folder), remedy)) from None
-        differing = [key for key in sorted({*before, *now}) if before.get(key) != now.get(key)]
         if differing:
             texts = (f"{key} is {before.get(key)} there and {now.get(key)} here" for key in differing)
             what, remedy = "a checkpoint of another job: " + "; ".join(texts), "run it as it was begun, or name another"
             raise MechanismError(Finding(what, str(folder), f"{remedy} folder"))
-        for file in folder.glob("*.npz"):
-            try:
-                with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
-                    self.parts[int(file.stem)] = dict(arrays)
-            except Exception:  # a damaged file raises almost anything; its block is done again
-                self.parts.pop(int(file.stem), None)
+        for block in range(job.blocks):
+            place = folder / f"{block}.npz"  # if it is damaged, which raises almost anything, it is done again
+            with suppress(Exception), place.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
+                self.parts[block] = dict(arrays)
 
 
 def _write(place: Path, raw: bytes) -> None:

@@ -35,6 +35,7 @@ from trunnion.solve.assembly import distance, grid, hints, named_way
 from trunnion.solve.drawn import hinted_at
 from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.loads import closes
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Cycle, System, law_of, rubbing
@@ -169,7 +170,7 @@ class Points:
         return list(dict.fromkeys([*along, *product(*({0, count - 1} for count in self.shape))]))
 
     def _like(self, index: Index) -> bool:
-        """Whether a point by itself has the numbers that one pass would give it, and leaves as much open."""
+        """Whether a point by itself has the numbers that one pass would give it, and the same tables and open ends."""
         run = self._prepared(index) if any(index) else self.run
         nominal_values, meant = run.values, self._values([index])
         if nominal_values.keys() != meant.keys() or run.system.plan.formula != self.run.system.plan.formula:
@@ -182,7 +183,10 @@ class Points:
             [(finding.where, finding.what) for finding in (each.determinacy.findings() if each.determinacy else ())]
             for each in (run, self.run)
         )
-        if not same or left_open != others_open:
+        closed, others_closed = (
+            [closes(each.system.mechanism, name) for name in each.system.mechanism.tables] for each in (run, self.run)
+        )
+        if not same or left_open != others_open or closed != others_closed:
             return False
         if not self._followed:
             return True

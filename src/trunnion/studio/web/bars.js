@@ -87,7 +87,7 @@ export function BottomBar() {
         onClick=${() => (ok && STUDY_OF[what] ? openStudy(STUDY_OF[what]) : state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`))}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
     </ul>
     <${Margin} />
-    <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms. Click a link or joint to choose it." : hint())}</span>
+    <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || hint()}</span>
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore

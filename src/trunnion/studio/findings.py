@@ -194,10 +194,10 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
         if set(chosen) == set(usual) and not any("friction" in joints[joint] for joint in chosen):  # it is stated once
             owners = {"all joints": (["joint_defaults"], entries.get("joint_defaults", {}), chosen[0])}
         gestures = []
-        for path, stated, joint in owners.values():
-            inside = ["coefficient"] if isinstance(stated.get("friction", {}), Mapping) else []
+        for section, entry, joint in owners.values():
+            inside = ["coefficient"] if isinstance(entry.get("friction", {}), Mapping) else []
             value = float(f"{ENOUGH * times * before[f'joints.{joint}.friction.coefficient']:.3g}")
-            gestures.append({"do": "set", "path": [*path, "friction", *inside], "value": value})
+            gestures.append({"do": "set", "path": [*section, "friction", *inside], "value": value})
         change = f"× {ENOUGH * times:.3g}"
         if len(owners) == 1:
             change = f"{before[f'joints.{chosen[0]}.friction.coefficient']:.3g} → {gestures[0]['value']:.3g}"

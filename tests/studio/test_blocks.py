@@ -32,6 +32,8 @@ def test_what_passes_the_wires_is_what_the_groups_give(name):
         assert earlier in found["blocks"][wire["from"]]["links"]
         assert later in found["blocks"][wire["to"]]["links"]
         back = -1 if layout[joint]["links"][1] == later else 1
+        kind = "friction_force" if layout[joint]["type"] == "prismatic" else "friction_torque"
+        near(wire["back"]["friction"], back * result[kind].sel(joint=joint))
         for axis in result["axis"].values:
             near(wire["back"]["force"][axis], back * result["reaction_force"].sel(joint=joint, axis=axis))
             for rate in ("position", "velocity"):

@@ -11,6 +11,7 @@ import pytest
 import trunnion
 from brief import brief
 from studio.asking import EXAMPLES, FLOAT, analysed, ask, column, near, sound
+from studio.test_whitworth import TEXT as RAM
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
@@ -254,6 +255,15 @@ def test_what_is_tried_is_written_and_lets_it_run():
         text = ask(ask="edit", text=PRESS, places={}, gestures=cure["gestures"])["text"]
         assert float(brief(mechanism_of(text, {}), STEPS)["locking_margin"].min()) > 1
         assert text.count("#") == PRESS.count("#")  # remarks stay
+
+
+def test_a_coefficient_that_all_joints_share_is_tried_where_it_is_stated():
+    text = RAM.replace("friction: 0.12", "friction: 1.6")
+    (finding,) = [one for one in ask(ask="cycle", text=text)["findings"] if one["code"] == "friction.locked"]
+    (cure,) = [one for one in finding["cures"] if "all joints" in one["label"]]
+    tried = ask(ask="edit", text=text, places={}, gestures=cure["gestures"])["text"]
+    assert tried == text.replace("1.6", cure["label"].rpartition(" ")[2])
+    assert float(brief(mechanism_of(tried, {}), STEPS)["locking_margin"].min()) > 1
 
 
 def test_the_margin_without_a_block_is_that_without_the_friction_of_its_joints():

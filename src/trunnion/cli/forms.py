@@ -12,26 +12,27 @@ from typing import Any, Union, get_args, get_origin
 from trunnion.cli.built import allocate, assemble, play, tolerance
 from trunnion.cli.files import options_of
 from trunnion.cli.measured import compare, identify
-from trunnion.cli.motion import simulate
+from trunnion.cli.motion import design, locking, simulate
 from trunnion.cli.sweep import sweep
 
 __all__ = ["forms"]
 
-STUDIES = (play, tolerance, allocate, simulate, sweep, assemble, compare, identify)
+STUDIES = (locking, design, play, tolerance, allocate, simulate, sweep, assemble, compare, identify)
 # what the studio sets itself, and options that read a file or concern files and processes
 LEFT_OUT = {
     *("file", "out", "report", "write", "force", "jobs", "cluster", "checkpoint", "table", "sample", "files"),
-    *("units_row", "units", "kind", "format", "engine", "uncut"),
+    *("units_row", "units", "columns", "kind", "format", "engine", "uncut"),
 }
 
 
 def forms() -> list[dict[str, Any]]:
-    """Every study with its options: verb, help, whether it reads a mapping, and fields {flag, help, kind, choices}."""
+    """Every study: verb, help, whether it reads a mapping, writes a report, and fields {flag, help, kind, choices}."""
     return [
         {
             "verb": study.__name__,
             "help": (study.__doc__ or "").strip().splitlines()[0],
             "mapping": "mapping" in signature(study).parameters,
+            "report": any(name == "report" for name, *_ in options_of(study)),
             "fields": list(_fields(study)),
         }
         for study in STUDIES

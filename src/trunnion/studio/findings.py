@@ -190,15 +190,18 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
     for chosen, times in trials:
         if times <= 0 or not all(joint in usual and isinstance(joints.get(joint), Mapping) for joint in chosen):
             continue
+        owners = {joint: (["joints", joint], joints[joint], joint) for joint in chosen}
+        if set(chosen) == set(usual) and not any("friction" in joints[joint] for joint in chosen):  # it is stated once
+            owners = {"all joints": (["joint_defaults"], entries.get("joint_defaults", {}), chosen[0])}
         gestures = []
-        for joint in chosen:
-            inside = ["coefficient"] if isinstance(joints[joint].get("friction", {}), Mapping) else []
+        for section, entry, joint in owners.values():
+            inside = ["coefficient"] if isinstance(entry.get("friction", {}), Mapping) else []
             value = float(f"{ENOUGH * times * before[f'joints.{joint}.friction.coefficient']:.3g}")
-            gestures.append({"do": "set", "path": ["joints", joint, "friction", *inside], "value": value})
+            gestures.append({"do": "set", "path": [*section, "friction", *inside], "value": value})
         change = f"× {ENOUGH * times:.3g}"
-        if len(chosen) == 1:
+        if len(owners) == 1:
             change = f"{before[f'joints.{chosen[0]}.friction.coefficient']:.3g} → {gestures[0]['value']:.3g}"
-        what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
+        what = f"friction coefficient{'s' * (len(owners) > 1)} of {', '.join(owners)}"
         listed.append({"label": f"{what} {change}", "gestures": gestures})
     shorter = ENOUGH * multiple if decides and multiple else None  # of the radius: a longer guide does as much
     for part, key, times in (("pin", "radius", shorter), ("guide", "length", shorter and 1.0 / shorter)):

@@ -67,7 +67,7 @@ class Jobs:
 
     Parameters
     ----------
-    forms : the verbs that can be started, with their options: {verb, mapping, fields: [{flag, kind, choices}]}.
+    forms : the verbs that can be started, with their options: {verb, mapping, report, fields: [{flag, kind, choices}]}.
     folder : of the models, where mappings of measured data are.
     """
 
@@ -94,7 +94,8 @@ class Jobs:
         folder = Path(tempfile.mkdtemp(dir=self._place.name))
         (folder / MODEL).write_text(str(options_asked["text"]), encoding="utf-8", newline="\n")
         files = [str(mapping)] if form["mapping"] else []
-        command = [sys.executable, "-m", "trunnion", form["verb"], MODEL, *files, *options, "--report", REPORT]
+        report = ["--report", REPORT] if form["report"] else []
+        command = [sys.executable, "-m", "trunnion", form["verb"], MODEL, *files, *options, *report]
         shown = ["trunnion", form["verb"], name, *([mapping.name] if mapping and form["mapping"] else []), *options]
         with (folder / OUTPUT).open("wb") as output:
             process = subprocess.Popen(

@@ -16,7 +16,7 @@ import { Errors } from "./errors.js";
 import { sheet } from "./sheet.js";
 import { Space } from "./space.js";
 import { Stage } from "./stage.js";
-import { Guide, Welcome } from "./start.js";
+import { Guide, Welcome, step as taught } from "./start.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
 import { pointer } from "./tools.js";
@@ -101,10 +101,9 @@ function Messages() {
   const lacks = state.tool.value === "select" ? state.missing.value : [];
   const clock = (one) => new Date(one).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   const waiting = state.waiting.value;
-  const below = low.value;
-  return html`<div class=${below ? "messages below" : "messages"}>
-    <${Hint} />
-    <${Guide} />
+  const lesson = taught.value !== null; // its rings are above the middle
+  return html`<div class=${low.value || lesson ? "messages below" : "messages"}>
+    ${lesson ? html`<${Guide} />` : html`<${Hint} />`}
     <${GroupBar} />
     <${Failures} />
     ${state.stopped.value && html`<div class="message-card bad" role="alert">${state.stopped.value}</div>`}

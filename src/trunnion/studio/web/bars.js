@@ -42,7 +42,7 @@ export function TopBar() {
         onChange=${(event) => (state.layers.value = { ...state.layers.value, [name]: event.target.checked })} /> ${label}</label>`)}
       <label class="tick"><input type="checkbox" checked=${state.snapping.value} onChange=${(event) => (state.snapping.value = event.target.checked)} /> Snap to the grid</label>
     <//>`}
-    <${Button} label="Studies …" title="Play, tolerance, allocation, motion in time, sweep, measured data" disabled=${!state.solved.value} onClick=${() => openStudy()} />
+    <${Button} label="Studies …" title="Locking, design, play, tolerance, allocation, motion in time, sweep, measured data" disabled=${!state.solved.value} onClick=${() => openStudy()} />
     <${Menu} label="Export" disabled=${!state.solved.value}>${EXPORTS.map(([what, label]) => html`<${Button} label=${label} onClick=${() => exported(what)} />`)}<//>
     <${Button} kind="icon" label=${`Colours: ${theme.value}`} title=${`Colours: ${theme.value}; click for the next`} onClick=${nextTheme}><${Icon} name=${theme.value} /><//>
   </header>`; // prettier-ignore
@@ -87,7 +87,7 @@ export function BottomBar() {
         onClick=${() => (ok && STUDY_OF[what] ? openStudy(STUDY_OF[what]) : state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`))}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
     </ul>
     <${Margin} />
-    <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms. Click a link or joint to choose it." : hint())}</span>
+    <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || hint()}</span>
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore

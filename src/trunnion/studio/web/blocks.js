@@ -199,8 +199,9 @@ function Values({ found }) {
   const margins = marginsOf(found, order, index);
   const upTo = (value) => (value >= BEYOND ? `> ${BEYOND}` : number(value, 3));
   const units = found.scene.units;
-  const vector = (parts, unit) => (parts ? Object.values(parts).map((one) => quantity(one[index], unit, undefined, units)).join(", ") : "—");
-  const amount = (part, unit) => (part === undefined ? "—" : Array.isArray(part) ? quantity(part[index], unit, undefined, units) : vector(part, unit));
+  const figure = (values, unit) => quantity(values[index], unit, undefined, units).replaceAll(" ", "\u00a0");
+  const vector = (parts, unit) => (parts ? Object.values(parts).map((one) => figure(one, unit)).join(", ") : "—");
+  const amount = (part, unit) => (part === undefined ? "—" : Array.isArray(part) ? figure(part, unit) : vector(part, unit));
   const goes = (wire) => (order === null ? `${wire.links[0]} → ${wire.links[1]}` : wire.to === order ? `from ${wire.links[0]}` : `to ${wire.links[1]}`);
   const backs = ({ type, back }) => [
     ...(type === "revolute" && Array.isArray(back.moment) ? [] : [["moment", amount(back.moment, "N m")]]),
@@ -247,10 +248,11 @@ function pinsOf() {
 /** A block of the list, its pins chosen or typed, becomes links and joints of the drawing. */
 function Palette() {
   const [kind, setKind] = useState("driver");
-  const [pins, setPins] = useState(["", "", ""]);
+  const [pins, setPins] = useState([null, "", ""]);
   const [typed, setTyped] = useState({ ground: ["0 mm, 0 mm", "100 mm, 0 mm", "100 mm, 100 mm"], at: "", ratio: "20:40" });
   const choices = pinsOf();
-  const there = (order) => (choices.some(({ value }) => value === pins[order]) ? pins[order] : ""); // it may be gone
+  const free = choices.find(({ value }) => value.includes("."))?.value ?? ""; // what the first pin is wired to until it is chosen
+  const there = (order) => (choices.some(({ value }) => value === pins[order]) ? pins[order] : order ? "" : free); // it may be gone
   const { pins: count } = KINDS[kind];
   const fields = kind === "CCC" ? 0 : Math.max(count, 1);
   const take = (order) => (event) => setPins(pins.map((one, at) => (at === order ? event.target.value : one)));
@@ -260,6 +262,7 @@ function Palette() {
     const ends = Array.from({ length: fields }, (_, order) => (count && there(order) ? there(order) : { ground: typed.ground[order] }));
     if (!(await edit([{ do: "block", kind, pins: ends, at: typed.at, ratio: typed.ratio }]))) return;
     setTyped({ ...typed, at: "" });
+    setPins([null, "", ""]);
     if (state.spatial.value) return;
     sheet.fit();
     if (choices.length < 2) sheet.zoom(0.4); // a first block has room for more

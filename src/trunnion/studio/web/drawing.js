@@ -39,7 +39,7 @@ export function frameOf(width, height, scale, left, foot) {
 
 /** The frame that shows a box {x, y, width, height} in m with room around it. */
 export function fitted(width, height, box) {
-  const margin = Math.min(90, 0.14 * Math.min(width, height));
+  const margin = 0.14 * Math.min(width, height); // for arrows, which are as much longer in a larger window
   const one = box ?? { x: -0.15, y: -0.1, width: 0.3, height: 0.2 };
   const across = Math.max(one.width, 0.02 * one.height, 1e-6);
   const up = Math.max(one.height, 0.02 * one.width, 1e-6);

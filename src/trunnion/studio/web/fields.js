@@ -52,7 +52,10 @@ export function rowsOf(entries, kind, name) {
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))
     .filter(({ path }) => !known(path));
   const ways = usual.map(([way]) => [...from, ...way.split(".")]);
-  const order = ({ path }) => ways.findIndex((way) => starts(way, path) || starts(path, way));
+  const order = ({ path }) => {
+    const at = ways.findIndex((way) => starts(way, path) || starts(path, way));
+    return at < 0 && kind === "model" ? ways.length : at; // of a part what has no place in the list stands first: its type, its links
+  };
   const rows = [...there, ...missing].sort((a, b) => order(a) - order(b)); // a row stays where it is when it is filled
   return rows.filter(({ path }) => path[2] !== "joint").map((row) => ({ ...row, where: from[0] === "loop" ? ["loop", name, ...row.path.slice(2)] : row.path, label: row.label ?? labelOf(row.path.slice(from.length), row.value), choices: choicesOf(kind, row.path[2], part, entries) }));
 }

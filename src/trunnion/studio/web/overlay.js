@@ -51,7 +51,7 @@ export function poseOverlay(view) {
   const point = corner ? null : found.point;
   const told = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
   const key = []; // lines of the key, from below
-  room = view.frame.width - 6;
+  room = view.frame.width - 56; // beside the buttons that zoom
   dimensions = [];
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));

@@ -56,7 +56,9 @@ function Curves({ class: kind, listOf }) {
         list = found ? listOf(found, others) : [];
         last = (found?.scene.count ?? 1) - 1;
         list.forEach(({ element }) => Object.assign(element, { tabIndex: 0, ariaLabel: `${element.querySelector(".title").textContent}, curves over the drive: the arrow keys move the position` }));
+        const focused = box.contains(document.activeElement) ? document.activeElement.ariaLabel : null;
         box.replaceChildren(...list.map((chart) => chart.element));
+        list.find(({ element }) => element.ariaLabel === focused)?.element.focus({ preventScroll: true }); // keys go on where they were
         untracked(() => follow(state.index.value));
       }),
       effect(() => follow(state.index.value)),

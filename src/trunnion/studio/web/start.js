@@ -138,8 +138,7 @@ export function rings({ frame, scene, posed }) {
 
 /** The card that says the next step. */
 export function Guide() {
-  const now = step.value;
-  if (now === null) return null;
+  const now = step.value ?? 0;
   const over = now === STEPS.length;
   return html`<section class="guide message-card" aria-label="First mechanism">
     <b>${over ? "It runs" : `Step ${now + 1} of ${STEPS.length}`}</b>

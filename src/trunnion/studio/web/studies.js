@@ -8,8 +8,8 @@ import { Button, html } from "./ui.js";
 
 /** What a study is called; others by their verb. */
 const TITLES = {
-  locking: "Locking", assemble: "Assembly", play: "Play", sweep: "Sweep of a number", tolerance: "Tolerances", allocate: "Tolerances to buy", simulate: "Motion in time",
-  design: "Design", optimise: "Best numbers", compare: "Compare with measured data", identify: "Identify from measured data", rig: "Virtual test rig",
+  assemble: "Assembly", sweep: "Sweep of a number", tolerance: "Tolerances", allocate: "Tolerances to buy", simulate: "Motion in time",
+  compare: "Compare with measured data", identify: "Identify from measured data",
 }; // prettier-ignore
 const titleOf = (name) => TITLES[name] ?? `${name[0].toUpperCase()}${name.slice(1)}`;
 /** Help of an option without what is for the command line alone. */

@@ -6,11 +6,12 @@ import { gridStep, lengthOf, lengthText, lengthUnit } from "./geometry.js";
 import { numberOf, plainNumber } from "./fields.js";
 import { chooseBox } from "./group.js";
 import { crossingAt, linkOf, resisted } from "./sheet.js";
-import { group, pending, say, selection, tool } from "./state.js";
+import { group, pending, say, selection, spatial, tool } from "./state.js";
 
 const TURN = Math.PI / 12; // guides and forces turn by 15°
 const FORCE = "100 N"; // of a load that is drawn without a number
 const TORQUE = "10 N m"; // of one against the motion of a joint that turns
+const IN_SPACE = "Drag turns the mechanism. With Shift a drag shifts it, and the wheel zooms. Click a link or joint to choose it.";
 
 /** Letters typed while something is drawn: its length, force, stiffness, ratio or angle. */
 export const typed = signal("");
@@ -47,7 +48,7 @@ export function choose(id) {
 /** What to do next, in a sentence; where fingers are all there is, without what asks for keys. */
 export function hint() {
   const { hint: words } = toolOf();
-  const own = words[pending.value ? words.length - 1 : 0];
+  const own = spatial.value ? IN_SPACE : words[pending.value ? words.length - 1 : 0];
   const touched = matchMedia("(hover: none) and (pointer: coarse)").matches;
   return touched ? own.replace(/ [^.]*\b(Shift|Alt)\b[^.]*\./g, "").replace(/\bClick\b/g, "Touch") : own;
 }

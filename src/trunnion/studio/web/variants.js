@@ -46,8 +46,9 @@ function laidOver(one, { abscissa }) {
 function rowsOf(now, before) {
   return now.map(({ name, title, text, value }) => {
     const other = before.find((one) => one.name === name);
-    const change = other?.value && value !== null ? (100 * (value - other.value)) / Math.abs(other.value) : null;
-    return { label: title, texts: [other?.text ?? "—", text, change === null ? "—" : `${change < 0 ? "−" : "+"}${Math.abs(change).toFixed(1)} %`] };
+    const change = other?.value && value !== null ? Math.round((1000 * (value - other.value)) / Math.abs(other.value)) / 10 : null;
+    const sign = change ? (change < 0 ? "−" : "+") : ""; // none of what is rounding
+    return { label: title, texts: [other?.text ?? "—", text, change === null ? "—" : `${sign}${Math.abs(change).toFixed(1)} %`] };
   });
 }
 

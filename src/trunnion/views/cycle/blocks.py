@@ -64,10 +64,11 @@ def _passing(system: System, result: xr.Dataset, joint: str, earlier: str, later
         forward["rate"] = result["link_angle_velocity"].sel(link=earlier).values
     sign = -1.0 if system.joints[joint][1][1] == later else 1.0  # reactions are on the second link, by the first
     moment = sign * result["reaction_moment"].sel(joint=joint).values
+    friction = result["friction_torque" if system.turns(joint) else "friction_force"].sel(joint=joint).values
     back = {
         "force": dict(zip(axes, sign * result["reaction_force"].sel(joint=joint).values, strict=True)),
         "moment": dict(zip(axes, moment, strict=True)) if moment.ndim > 1 else moment,
-        "friction": result["friction_torque" if system.turns(joint) else "friction_force"].sel(joint=joint).values,
+        "friction": sign * friction,
     }
     return {"forward": forward, "back": back}
 

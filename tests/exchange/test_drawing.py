@@ -29,8 +29,7 @@ from mechanisms import (
     watt_six_bar,
 )
 from trunnion.exchange import export_model, import_file
-from trunnion.exchange.dxf import write
-from trunnion.exchange.formats import ExportOptions
+from trunnion.exchange.drawing import write
 from trunnion.exchange.skeleton import positions_of
 from trunnion.model.mechanism import Mechanism
 
@@ -99,8 +98,9 @@ def test_what_is_drawn_comes_back_in_any_frame(
     path = tmp_path_factory.mktemp("frame") / "out.dxf"
     positions = positions_of(mechanism, 11)
     row = 7 if np.isfinite(positions.result["point_position"].values[..., 7]).all() else 0
-    write(positions, path, ExportOptions(row=row))
-    drawn = positions.draft(row)
+    positions = positions_of(mechanism, 11, f"{float(positions.result['time'].values[row]):.17g}s")
+    write(positions, path)
+    drawn = positions.draft()
     again = import_file(path, ground=drawn.ground)
     assert again.pairs.keys() == drawn.pairs.keys()
     for joint, pair in drawn.pairs.items():

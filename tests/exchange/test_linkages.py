@@ -72,21 +72,6 @@ SLIDER = {
         {"id": "rod", "type": "link", "joints": ["A", "B"]},
     ],
 }
-OLD = {
-    "name": "old",
-    "joints": [
-        {"type": "Crank", "name": "B", "x": 0.0, "y": 1.0, "distance": 1.0, "angle": 0.31,
-         "joint0": {"inline": True, "type": "Static", "x": 0.0, "y": 0.0, "name": "A"}},
-        {"type": "Static", "name": "D", "x": 3.0, "y": 0.0},
-        {"type": "Revolute", "name": "C", "x": 3.0, "y": 2.0, "distance0": 3.1622776601683795, "distance1": 2.0,
-         "joint0": {"ref": "B"}, "joint1": {"ref": "D"}},
-        {"type": "Fixed", "name": "T", "x": 1.5, "y": 2.5, "joint0": {"ref": "B"}, "joint1": {"ref": "C"},
-         "distance": 1.0, "angle": 0.3},
-        {"type": "Linear", "name": "S", "x": 5.0, "y": 3.0, "joint0": {"ref": "C"}, "revolute_radius": 2.23606797749979,
-         "joint1": {"inline": True, "type": "Static", "x": 0.0, "y": 3.0, "name": None},
-         "joint2": {"inline": True, "type": "Static", "x": 1.0, "y": 3.0, "name": None}},
-    ],
-}  # fmt: skip
 
 
 def model(draft: Draft, tmp_path: Path) -> Mechanism:
@@ -220,7 +205,7 @@ def test_a_slider_of_pylinkage_is_a_pin_on_a_line(tmp_path: Path) -> None:
 def damaged() -> list[Any]:
     """Files with something taken out or replaced, everywhere."""
     found: list[Any] = ["", "[1, 2", "{}", "[]", "null", '{"joints": 3}', '{"joints": []}', "[" * 100_000, "\x00\xff"]
-    for base, key in (*((FOUR_BAR, key) for key in ("joints", "links")), (OLD, "joints")):
+    for base, key in ((FOUR_BAR, key) for key in ("joints", "links")):
         for k, part in ((k, part) for k, item in enumerate(base[key]) for part in item):
             for value in (None, "?", {}, float("nan")):
                 changed = json.loads(json.dumps(base))
@@ -240,7 +225,7 @@ def test_damaged_files_are_refused_or_read_but_never_end_in_a_traceback(tmp_path
         except MechanismError:
             refused += 1
     assert refused > 80
-    twice = {**OLD, "joints": [*OLD["joints"], OLD["joints"][1]]}
+    twice = {**FOUR_BAR, "joints": [*FOUR_BAR["joints"], FOUR_BAR["joints"][1]]}
     with pytest.raises(MechanismError, match="two joints of the same name"):
         import_file(written(twice, tmp_path))
     many = {"joints": [{"id": str(k), "type": "revolute", "position": [k, 0]} for k in range(100_000)], "links": []}

@@ -129,6 +129,34 @@ def test_what_is_constant_has_no_place(length: float, force: float) -> None:
     assert set(placed.values()) == {"everywhere"}
 
 
+def test_joints_in_one_point_have_loads_and_losses() -> None:
+    """The pins of a Cardan joint lie in one point, whose places are nothing but rounding."""
+    axis, across = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
+    out = [float(np.cos(0.35)), float(np.sin(0.35)), 0.0]
+    middle = [0.0, 0.0, 0.0]
+    data = {
+        "space": "spatial", "gravity": middle, "over_constraint": "minimum-norm",
+        "links": {
+            "ground": {"points": {"A": {"at": middle, "axis": axis, "x": across},
+                                  "C": {"at": middle, "axis": out, "x": [0, 0, 1]}}},
+            "input": {"points": {"A": {"at": middle, "axis": axis, "x": across}, "K": {"at": middle, "axis": across}}},
+            "output": {"points": {"C": {"at": middle, "axis": axis, "x": [0, 0, 1]},
+                                  "K": {"at": middle, "axis": [0, 0, 1]}}},
+        },
+        "joints": {"A": {"type": "revolute", "links": ["ground", "input"]},
+                   "C": {"type": "cylindrical", "links": ["ground", "output"]},
+                   "K": {"type": "universal", "links": ["input", "output"]}},
+        "joint_defaults": {"pin": {"radius": 0.006, "bearing": 0.04}, "friction": 0.15},
+        "drivers": {"A": {"speed": 10.0}}, "loads": {"brake": {"joint": "C", "resisting_torque": 10, "useful": True}},
+        "assembly": {"C": 0},
+    }  # fmt: skip
+    result = trunnion.analyse(Mechanism(**data), 90)
+    figures = {each.name: each.value for each in result.trunnion.summary}
+    useful = 10 * 10  # W, of a brake that turns as fast as the driver on average
+    assert figures["friction_power_mean"] == pytest.approx(useful / figures["efficiency"] - useful, rel=1e-6)
+    assert figures["K.end_load_max"] == pytest.approx(figures["K.reaction_moment_max"] / 0.04, rel=0.01)
+
+
 def test_a_sweep_tells_its_scales() -> None:
     swept = trunnion.sweep(Mechanism(**balanced()), {"joint_defaults.friction.coefficient": [0.1, 0.2]}, steps=12)
     assert np.all(without_noise(swept)["drive_effort_max"].values == 0)

@@ -253,7 +253,7 @@ WRONG: list[dict[str, Any]] = [
     {"links.crank.mass": -1.0}, {"joints.B.pin.radius": 0.0},
     {"joints.B.friction.coefficient": -0.1, "links.coupler.mass": -2.0}, {"drivers.A.speed": 0.0},
     {"links.coupler.inertia": -1.0}, {"links.coupler.points.C.x": 0.0, "links.coupler.points.C.y": 0.0},
-    {"AB": float("inf"), "joint_defaults.friction.coefficient": 7.0},
+    {"AB": 1.9, "joint_defaults.friction.coefficient": -7.0},
 ]  # fmt: skip
 SOUND: list[dict[str, Any]] = [{"AB": 1.9}, {"AB": float("nan")}]
 

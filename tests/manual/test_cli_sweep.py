@@ -86,7 +86,7 @@ BAD = {
     "no steps": (["--over", "AB=1m,2m", "--steps", "0"], "0 positions"),
     "two in one file": (
         ["--over", "AB=1m", *(f"--measure={one}" for one in ("efficiency", "status")), "--out=a.svg"],
-        "2 figures do not fit one file — --out a makes a folder",
+        "2 figures do not fit one file — give one --measure",
     ),
     "axis of a stranger": (["--over", "AB=1m,2m", "--x", "BC"], "'BC' is not swept over"),
     "unknown kind": (["--over", "AB=1m,2m", "--kind", "contour"], "no figure 'contour'"),

@@ -263,3 +263,32 @@ def test_what_cannot_be_allocated() -> None:
     ):
         with pytest.raises(MechanismError, match=text):
             trunnion.allocate(model, choice=choice)
+
+
+def test_a_tolerance_without_effect_is_not_bounded_by_rounding() -> None:
+    """The toggle of a press is straight at the least height whatever its crank is, whose slope there is rounding."""
+    press = Mechanism(
+        dimensions={"a": 0.25, "r": 0.09},
+        gravity=[0, 0],
+        links={
+            "ground": {"points": {"O": [0, 0], "A": [0.48, -0.18], "S": {"at": [0, 0], "axis": [0, -1]}}},
+            "crank": {"points": {"A": [0, 0], "B": ["r", 0]}},
+            "pull": {"points": {"B": [0, 0], "C": [0.52, 0]}},
+            "upper": {"points": {"O": [0, 0], "K": ["a", 0], "C": ["a", 0]}},
+            "lower": {"points": {"K": [0, 0], "P": [0.3, 0]}},
+            "ram": {"points": {"P": [0, 0], "S": {"at": [0, 0], "axis": [0, -1]}}},
+        },
+        joints={
+            **{name: {"type": "revolute", "links": links.split()} for name, links in {
+                "A": "ground crank", "B": "crank pull", "C": "pull upper", "O": "ground upper", "K": "upper lower",
+                "P": "lower ram"}.items()},
+            "S": {"type": "prismatic", "links": ["ground", "ram"]},
+        },
+        drivers={"A": {"speed": 4.0}},
+        assembly={"K": [0.1, -0.23], "P": [0, -0.5]},
+        tolerances={"a": "±0.1 mm", "r": "±0.05 mm"},
+        measures={"low": {"point": "ram.P", "axis": "y", "as": "minimum", "limit": "±0.3 mm"}},
+        costs={name: {"model": "power", "B": 2, "k": 0.5, "unit": "mm"} for name in "ar"},
+    )  # fmt: skip
+    result = trunnion.allocate(press, steps=36, samples=0)
+    assert findings(result, "error") == ["costs.dimensions.r: no limit bounds this tolerance, and wider is cheaper"]

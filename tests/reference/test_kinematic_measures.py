@@ -311,8 +311,8 @@ def test_a_sweep_and_a_tolerance_know_them() -> None:
 
 def test_an_expression_that_is_its_own_circle_or_means_nothing_is_a_finding() -> None:
     for text, says in [
-        ("2 * lead", "itself"), ("input - ab", "added"), ("high - low", "one number"), ("__import__('os')", ""),
-        ("swing + input", "place or over a range"),
+        ("2 * lead", "itself"), ("input - ab", "added"), ("high - low", "at every position"), ("__import__('os')", ""),
+        ("swing + input", "without place, range"),
     ]:  # fmt: skip
         own = {
             "input": "A.rotation", "lead": text, "high": {"stroke": "D"}, "low": {"stroke": "D"},

@@ -242,7 +242,6 @@ def test_limit(place: dict[str, str]) -> None:
         data["measures"]["swing"]["limit"] = f"{factor * worst} deg"
         result = trunnion.play(trunnion.Mechanism(**data), steps=72)
         assert [one.code for one in result.trunnion.findings if one.where == "measures.swing.limit"] == [code]
-        assert bool(json.loads(result.attrs["missed"])) == (factor < 1)
 
 
 @pytest.mark.slow

@@ -152,7 +152,6 @@ def test_what_is_outside_the_limits(limits: dict[str, Any], methods: list[str], 
     assert bool(rows) == bool(told)
     for word in told:
         assert word in rows[0]["what"]
-    assert len(json.loads(found.attrs["missed"])) == len(rows)
 
 
 def test_what_is_allocated_keeps_the_limit() -> None:

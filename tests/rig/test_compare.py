@@ -72,18 +72,21 @@ def test_uncertainty_of_a_bias(resolution: float, zero: float) -> None:
 
 @pytest.mark.spread(5)
 @pytest.mark.parametrize("turns", [3, 12])
-@pytest.mark.parametrize(("zero", "gain"), [(0.0, 0.0), (0.3, 0.0), (0.05, 0.01)])
+@pytest.mark.parametrize(("zero", "gain", "off"), [(0, 0, 0), (0.3, 0, 0), (0.05, 0.01, 0), (0, 0, 0.05)])
 @pytest.mark.parametrize("smooth", [1, 9])
-def test_a_true_model_is_within_in_about_95_percent(turns, zero, gain, smooth):
-    """Of courses with noise, correlated or not, and sensors whose zero and gain are off as they are stated to be."""
+def test_a_true_model_is_within_in_about_95_percent(turns, zero, gain, off, smooth):
+    """Of courses with noise, correlated or not, and sensors whose zero, gain and angle are off as stated, in rad."""
     random, count = np.random.default_rng(4), 60
-    true = 10 + 3 * np.sin(2 * np.pi * np.arange(count) / count)
+    drive = 2 * np.pi * np.arange(count) / count
+    true = 10 + 3 * np.sin(drive)
     kernel = np.fft.rfft(np.ones(smooth) / smooth**0.5, count)
     shares, within = [], 0
     for _ in range(150):
         noise = np.fft.irfft(np.fft.rfft(random.normal(size=(turns, count)), axis=1) * kernel, count)
         found = true * (1 + gain * random.normal()) + zero * random.normal() + 0.2 * noise
-        one = judge(course("torque", found, Accuracy(zero, gain)), true, np.ones(count, bool), true)
+        found += 3 * (np.sin(drive + off * random.normal()) - np.sin(drive)) if off else 0
+        slope = 3 * off * np.cos(drive)
+        one = judge(course("torque", found, Accuracy(zero, gain)), true, np.ones(count, bool), true, angle=slope)
         shares.append(one["within"])
         within += one["verdict"] is Verdict.WITHIN
     assert np.mean(shares) == pytest.approx(0.9545, abs=0.035)
@@ -289,7 +292,7 @@ def test_one_turn_is_no_uncertainty():
     assert np.isfinite(result.rms.values).all()
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "channels.torque", "no position with values from two turns", "warning")
+    assert said(result, "channels.torque", "for lack of values from two turns", "warning")
     assert said(result, "efficiency", "not known in run 1: there is only one turn", "more turns")
 
 

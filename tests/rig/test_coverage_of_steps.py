@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import trunnion
-from trunnion.rig.identification.uncertainty import _combination
 
 Array = NDArray[np.float64]
 TRUE = {"A": 0.08, "B": 0.14, "C": 0.11, "D": 0.06}
@@ -115,16 +113,6 @@ def test_fewer_positions_than_unknowns(tmp_path: Path) -> None:
     found = identified(tmp_path, 1, 0.25, positions=8)
     assert "parameter.not_told_apart" in {one.code for one in found.trunnion.findings}
     assert np.isnan(found.estimate.values).any()
-
-
-def test_frictions_of_two_joints_add() -> None:
-    """Even where μ_A dB = μ_B dA, at which a product would not change either."""
-    unknowns = [SimpleNamespace(name=path, unit="1", paths=[f"joints.{path}"]) for path in COEFFICIENTS[:2]]
-    problem: Any = SimpleNamespace(count=2, model=SimpleNamespace(unknowns=unknowns), sensors=[])
-    arguments = np.array([0.08, 0.14]), np.array([0, 1]), 0.08 / 0.14, 0.01
-    assert "+ 0.571 B.friction.coefficient (SI) is determined, 0.160" in _combination(problem, *arguments)
-    unknowns[1].paths = ["joints.A.friction.pair_factor"]
-    assert "their product is determined, 0.0112" in _combination(problem, *arguments)
 
 
 @pytest.mark.slow

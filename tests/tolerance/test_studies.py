@@ -131,6 +131,7 @@ def test_limits_of_a_measure_over_the_turn() -> None:
 REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "nothing varies": ({"tolerances": {}}, {}, "nothing has a tolerance"),
     "no such measure": ({}, {"measures": ["bogus"]}, "is no measure"),
+    "no such point": ({}, {"measures": ["rocker.Q.x"]}, "--measure rocker.Q.x: there is no point 'rocker.Q'"),
     "no such method": ({}, {"methods": ["bogus"]}, "no method 'bogus'"),
     "two at once": ({}, {"methods": ["monte-carlo", "quasi-monte-carlo"]}, "two sampling methods"),
     "no samples": ({}, {"samples": 0}, "0 samples"),

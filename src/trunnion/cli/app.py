@@ -6,6 +6,8 @@ Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead cent
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from itertools import chain
 from typing import Annotated, Any
 
 import typer
@@ -21,13 +23,13 @@ from trunnion.cli.sweep import sweep
 from trunnion.version import __version__
 
 GROUPS = {
-    "Model": ("check", "examples", "schema", "studio"),
-    "Motion and forces": ("analyse", "simulate", "locking", "design"),
-    "As built": ("assemble", "play", "tolerance", "allocate"),
-    "Many mechanisms": ("sweep",),
-    "Measured data": ("rig", "data", "compare", "identify"),
-    "Pictures": ("plot", "report"),
-    "Other programs": ("import", "export"),
+    "Model": (check, examples, schema, studio),
+    "Motion and forces": (analyse, simulate, locking, design),
+    "As built": (assemble, play, tolerance, allocate),
+    "Many mechanisms": (sweep,),
+    "Measured data": (rig, data, compare, identify),
+    "Pictures": (plot, report),
+    "Other programs": (import_, export),
 }
 # Each runs in a folder with the models that `trunnion examples NAME` copies; mapping.yaml is one of measured data.
 EXAMPLES = {
@@ -59,15 +61,18 @@ EXAMPLES = {
 }
 
 
+def _name(verb: Callable[..., None]) -> str:
+    return verb.__name__.rstrip("_")  # `import` is a word of Python
+
+
 class Verbs(TyperGroup):
     """The verbs under the questions that they answer."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the verbs, group by group."""
-        for title, names in GROUPS.items():
-            rows = [
-                (name.ljust(9), self.commands[name].get_short_help_str(68)) for name in names if name in self.commands
-            ]
+        for title, verbs in GROUPS.items():
+            names = [name for name in map(_name, verbs) if name in self.commands]
+            rows = [(name.ljust(9), self.commands[name].get_short_help_str(68)) for name in names]
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
@@ -85,13 +90,9 @@ app = typer.Typer(
 )
 
 
-for function in (
-    check, analyse, design, simulate, studio, locking, assemble, tolerance, allocate, data, rig, compare, identify,
-    sweep, play, import_, export, plot, report, examples, schema,
-):  # fmt: skip
-    name = function.__name__.rstrip("_")  # `import` is a word of Python
-    lines = "\n".join(f"  trunnion {name} {words}".rstrip() for words in EXAMPLES[name])
-    app.command(name, epilog=f"\b\nExamples:\n{lines}")(function)
+for function in chain.from_iterable(GROUPS.values()):
+    lines = "\n".join(f"  trunnion {_name(function)} {words}".rstrip() for words in EXAMPLES[_name(function)])
+    app.command(_name(function), epilog=f"\b\nExamples:\n{lines}")(function)
 
 VERBS = app.registered_commands
 

@@ -23,7 +23,7 @@ from trunnion.files import Target, writing
 __all__ = ["flags_of", "options_of", "outputs", "verb"]
 
 Hints = dict[str, Any]  # types by the names of parameters
-IN_PLACE = {"write": "file", "write_mapping": "mapping"}  # may name that input itself; the verb asks for --force then
+IN_PLACE = {"write": "file"}  # may name that input itself; the verb asks for --force then
 
 
 def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Callable[..., None]]:

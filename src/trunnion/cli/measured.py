@@ -9,14 +9,11 @@ from typer import Argument, Option
 from trunnion.cli.files import verb
 from trunnion.cli.options import DATA, DataFiles, Files, Force, MappingFile, Model, Seed, Write, setting
 from trunnion.cli.result import (
-    YAML,
     Shown,
     check_files,
     check_model,
-    check_target,
     exit_status,
     show_tables,
-    write_text,
 )
 from trunnion.cli.terminal import bar, line, say, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
@@ -26,7 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
-    from trunnion.rig.virtual.observe import Observation
 
 __all__ = ["compare", "data", "estimated", "identify", "rig"]
 
@@ -69,7 +65,10 @@ def rig(
                 observation = observe(mechanism, rig_model, seed, progress)
         except MechanismError as error:  # findings about the rig bear the line of its file
             raise MechanismError(placed_in_rig(error.findings, rig_file)) from None
-    _about(observation)
+    conditions = counted(len(observation.cases), "condition")
+    line(rig_model.name or "Test rig", "bold")
+    line(f"{mechanism.name or 'no name'}; {conditions} of {counted(rig_model.schedule.turns, 'cycle')}; "
+         f"{observation.rate:g} samples a second; {counted(observation.rows, 'row')}")  # fmt: skip
     if out:
         with bar("files", len(observation.cases), least=FEWEST) as progress:
             names = observation.write(out, format_, progress)
@@ -79,20 +78,6 @@ def rig(
         line(f"  {span}, {', '.join(names[-2:])}")
     say(placed_in_rig(observation.findings, rig_file))
     raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
-
-
-def _about(observation: "Observation") -> None:
-    """What is recorded: conditions, turns, samples."""
-    conditions = len(observation.cases)
-    rows = max(case.rows for case in observation.cases)
-    line(observation.rig.name or "Test rig", "bold")
-    texts = (
-        observation.mechanism.name or "no name",
-        f"{counted(conditions, 'condition')} of {counted(observation.rig.schedule.turns, 'cycle')}",
-        f"{observation.rate:g} samples a second",
-        counted(observation.rows, "row") + (f", at most {rows:,} a file" if conditions > 1 else ""),
-    )
-    line("; ".join(texts))
 
 
 # ---- data ------------------------------------------------------------------------------------------------------------
@@ -173,7 +158,7 @@ def identify(
     channel: Annotated[
         list[str] | None,
         Option("--channel",
-               help="A channel by its name in the mapping, or efficiency. Repeatable; default: all usable ones."),
+               help="A channel by its name in the mapping. Repeatable; default: all usable ones."),
     ] = None,
     start: Annotated[
         list[str] | None, Option("--start", help="NAME=VALUE: start value; default: the value in the model.")
@@ -187,11 +172,6 @@ def identify(
         int | None, Option("--guard", help="Positions left out on each side of a friction reversal.")
     ] = None,
     write: Write = None,
-    write_mapping: Annotated[
-        Path | None,
-        Option("--write-mapping",
-               help="Write the mapping with the zero of the angle or of a channel that was found: .yaml."),
-    ] = None,
     force: Force = False,
     kind: Annotated[str | None, Option("--kind", help="Which figure: intervals or residuals.")] = None,
 ) -> None:  # fmt: skip
@@ -206,7 +186,6 @@ def identify(
 
     check_files(files, "identification", kind)
     check_model(write, model.file, force)
-    _check_mapping(write_mapping, mapping, force)
     mechanism = model.read()
     with model.lines():
         unknowns, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
@@ -226,8 +205,6 @@ def identify(
         findings += remarks
         if identified:
             output.write_model(identified, write, force)
-    if write_mapping is not None:
-        findings += _write_mapping(result, mapping, write_mapping, output.written)
     output.end(findings)
 
 
@@ -267,10 +244,8 @@ def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tup
         reduced = float(f"{float(result['reduced_chi_squared']):.3g}")
         misfit = f"the model does not fit (reduced χ² {reduced:,.10g})"
         what = f"'{write}' is not written: {misfit if 'fit.misfit' in errors else errors['sensor.off'] + ' is off'}"
-        explained = "sensor.off" in errors or "fit.cause" in {finding.code for finding in findings_of(result)}
-        correct = "correct what explains the misfit, and identify again"
-        search = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
-        return None, [Finding(what, "--write", correct if explained else search)]
+        remedy = "find the cause first: `trunnion compare` shows errors of sensors, angle and friction that explain it"
+        return None, [Finding(what, "--write", remedy)]
     estimates = zip(result["parameter"].values, result["told"].values, strict=True)
     lost = [str(name) for name, identifiable in estimates if not identifiable]
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
@@ -280,31 +255,6 @@ def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tup
     if lost:
         notes.append((f"{', '.join(lost)} unchanged: not identifiable from the data", ""))
     if encoder := result.attrs["encoder"]:
-        notes.append((f"{encoder} unchanged: by this the encoder is off", "write it into the mapping: --write-mapping"))
+        notes.append((f"{encoder} unchanged: by this the encoder is off", "correct angle: zero: in the mapping"))
     findings = [Finding(what, "--write", remedy, Severity.NOTE) for what, remedy in notes]
     return with_estimates(mechanism, result), findings
-
-
-def _check_mapping(write: Path | None, mapping: Path, force: bool) -> None:
-    """MechanismError for a mapping that cannot be written, is in another folder than its data, or is there already."""
-    if write is None:
-        return
-    if write.resolve().parent != mapping.resolve().parent:
-        what = f"'{write}' is not in the folder of '{mapping}', whose data it names"
-        raise MechanismError(Finding(what, "--write-mapping", "name a file there"))
-    check_target(write, "--write-mapping", "a mapping", YAML, force)
-
-
-def _write_mapping(result: "xr.Dataset", mapping: Path, write: Path, written: list[Path]) -> list[Finding]:
-    """The mapping with the zeros that were found, beside the data that it names."""
-    from trunnion.model.file import read_entries
-    from trunnion.model.rewrite import changed_text
-    from trunnion.rig.identification import corrected_mapping
-
-    try:
-        entries = corrected_mapping(read_entries(mapping, "a mapping file")[0], result)
-    except MechanismError as error:
-        return list(error.findings)
-    write_text(changed_text(mapping.read_text("utf-8"), entries), write)
-    written.append(write)
-    return []

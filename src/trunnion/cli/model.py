@@ -142,7 +142,7 @@ def studio(
     if file is not None and not path.exists():
         raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
     folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
-    bound = _usual() if port is None else _bound(port)
+    bound = _bound(port)
     server = Studio(folder, opened, bound.getsockname()[1], forms=forms())
     line(f"studio: {server.address}")
     line("It answers this machine alone. Ctrl-C ends it.")
@@ -153,28 +153,21 @@ def studio(
     server.server().run(sockets=[bound])
 
 
-def _usual() -> socket.socket:
-    """A socket on the usual port, where the browser finds unsaved work again; on any if that is taken."""
-    try:
-        return _bound(USUAL)
-    except MechanismError:
-        return _bound(0)
-
-
-def _bound(port: int) -> socket.socket:
-    """A socket on the loopback; MechanismError if the port is taken."""
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind(("127.0.0.1", port))
-        listener.listen(128)  # a browser that comes before the server runs waits instead of being refused
-    except (OSError, OverflowError) as error:
-        listener.close()
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MechanismError(
-            Finding(f"port {port} cannot be had: {reason}", "--port", "choose another, or 0")
-        ) from None
-    return listener
+def _bound(stated: int | None) -> socket.socket:
+    """A socket on the loopback, at the stated port; else at the usual one, where the browser finds unsaved work again,
+    or at any if that is taken. MechanismError if it cannot be had."""
+    reason = ""
+    for port in [USUAL, 0] if stated is None else [stated]:
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind(("127.0.0.1", port))
+            listener.listen(128)  # a browser that comes before the server runs waits instead of being refused
+            return listener
+        except (OSError, OverflowError) as error:
+            listener.close()
+            reason = getattr(error, "strerror", None) or str(error)
+    raise MechanismError(Finding(f"port {stated} cannot be had: {reason}", "--port", "choose another, or 0"))
 
 
 # ---- examples and schema ------------------------------------------------------------------------------------------

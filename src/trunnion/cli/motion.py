@@ -43,25 +43,15 @@ __all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]
 def analyse(
     model: Model, files: Files, settled: Friction, steps: Steps = 360, at: OnePosition = None, uncut: Uncut = False,
     engine: Engine = "auto",
-    variables: Annotated[
-        list[str] | None,
-        Option("--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable."),
-    ] = None,
-    dtype: Annotated[str, Option("--dtype", help="Numbers of the files: float64, or float32.")] = "float64",
 ) -> None:  # fmt: skip
     """Analyse a cycle: motion, reactions, friction, effort, power."""
-    from trunnion.cycle.positions import Kept
-
     check_files(files, drawn=False, instead=f"trunnion plot {model.file}")
-    selection = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
-    if files.report and selection.variables is not None:
-        raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
     if files.report and at:
         raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
     mechanism = model.read()
     saved = {"units_row": files.units_row, "columns": files.columns, "units": files.units}
     with model.lines():
-        result = _analysed(mechanism, steps, settled.checked(), engine, selection, files.out or [], saved, at)
+        result = _analysed(mechanism, steps, settled.checked(), engine=engine, out=files.out or [], saved=saved, at=at)
 
     def show_position() -> None:
         """Every number of one position, with its unit."""
@@ -151,12 +141,12 @@ def report(
     raise Exit(exit_status(findings_of(result)))
 
 
-def _analysed(mechanism: "Mechanism", steps: int, method: "FrictionMethod | None" = None, *more: Any) -> "Result":
+def _analysed(mechanism: "Mechanism", steps: int, method: "FrictionMethod | None" = None, **more: Any) -> "Result":
     """Analyse, with a progress bar when it takes long enough to need one. more: engine, … of `analysed`."""
     from trunnion.cycle.analyse import analysed
 
     with bar("positions", steps, least=200_000) as progress:
-        return analysed(mechanism, steps, method, progress, *more)
+        return analysed(mechanism, steps, method, progress, **more)
 
 
 def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":
@@ -210,13 +200,19 @@ def simulate(
     from trunnion.dynamics.opened import in_play
     from trunnion.dynamics.simulate import simulated
     from trunnion.dynamics.steady_cycle import UnsteadyError
+    from trunnion.results.tables import check_table
 
     of = "cycle" if steady else "motion"
     check_files(files, of, kind if files.out else None)
     duration = seconds(time, "--time", "2s")
     mechanism = model.read()
-    if files.out and not in_play(mechanism):
-        _check_without_play(files, of, kind)
+    if not in_play(mechanism):  # then there are no contacts to write or draw
+        for path in files.out or ():
+            check_table(path, of, in_play=False)
+        if kind and files.out:
+            from trunnion.views.motion.figure import check_contacts  # with matplotlib
+
+            check_contacts(kind, in_play=False)
     with model.lines(), bar("%", PERCENT) as progress:
         reached = None if progress is None else lambda share: progress(int(PERCENT * share))
         try:
@@ -224,18 +220,6 @@ def simulate(
         except UnsteadyError as unsteady:
             end(unsteady.findings, model.file, "drivers")
     Shown(result, model, files, "drivers", drawn={"kind": kind}).finish()
-
-
-def _check_without_play(files: Files, of: str, kind: str | None) -> None:
-    """MechanismError for a table or figure of contacts, of which there are none without joints in play."""
-    from trunnion.results.tables import check_table
-
-    for path in files.out or ():
-        check_table(path, of, in_play=False)
-    if kind:
-        from trunnion.views.motion.figure import check_contacts
-
-        check_contacts(kind, in_play=False)
 
 
 # ---- locking ---------------------------------------------------------------------------------------------------------

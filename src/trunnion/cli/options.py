@@ -219,12 +219,10 @@ def seconds(text: str | None, option: str, usual: str) -> float | None:
         return None
     remedy = f"give a time such as {usual}"
     try:
-        stated = Quantity.read(_plain(text), KINDS["time"])
-    except UnitError as error:
-        raise MechanismError(Finding(error.what, option, error.remedy or remedy)) from None
-    if stated.names:  # of a model, which is not asked here
-        raise MechanismError(Finding(f"'{text.strip()}' is no time", option, remedy))
-    time = float(stated.evaluate())
+        time = float(Quantity.read(_plain(text), KINDS["time"]).evaluate())
+    except (UnitError, KeyError) as error:  # a KeyError of a dimension of the model, which is not asked here
+        what = error.what if isinstance(error, UnitError) else f"'{text.strip()}' is no time"
+        raise MechanismError(Finding(what, option, getattr(error, "remedy", "") or remedy)) from None
     if not time > 0:
         raise MechanismError(Finding(f"a time of {text.strip()} is not above 0", option, remedy))
     return time

@@ -12,7 +12,7 @@ import typer
 from trunnion.cli.options import IMAGES, Files, Model, placed
 from trunnion.cli.terminal import line, say, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
-from trunnion.results.attributes import attribute, findings_of, summary_of
+from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.result import Result
 
 if TYPE_CHECKING:
@@ -166,9 +166,6 @@ class Shown:
 
         findings: those of the result if not given; status: where another than that of the findings.
         """
-        if self.tables or self.show:
-            for text in attribute(self.result, "missed"):  # what of the limits is not kept, before anything else
-                line(text, "bold")
         if self.show:
             self.show()
         elif self.tables:

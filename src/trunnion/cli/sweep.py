@@ -1,17 +1,15 @@
 """`trunnion sweep`: figures of the cycle over a grid of numbers of the model, as tables, files, curves and maps."""
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 from typer import Option
 
 from trunnion.cli.files import verb
-from trunnion.cli.options import IMAGES, Engine, Files, Model, Picture, Steps, Uncut, over, points
+from trunnion.cli.options import IMAGES, Engine, Files, Model, Steps, Uncut, over, points
 from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.cli.terminal import bar, console, line
 from trunnion.errors import Finding, MechanismError, counted
-from trunnion.files import folder
 
 __all__ = ["sweep"]
 
@@ -41,23 +39,30 @@ def sweep(
     margin: Annotated[
         bool, Option("--margin", help="Compute the locking margin too; takes many times as long.")
     ] = False,
-    steps: Steps = 360, image: Picture = "png", uncut: Uncut = False, engine: Engine = "auto",
+    steps: Steps = 360, uncut: Uncut = False, engine: Engine = "auto",
 ) -> None:  # fmt: skip
     """Results over a range of model values: tables, curves, maps.
 
     Efficiency, drive effort, reactions, friction, locking margin and measures of the model.
     """
     from trunnion.studies.sweep.study import sweep as run
+    from trunnion.views.charts import check_kind
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.scales import check_measure
+    from trunnion.views.scales import KINDS, check_axes, check_measure
     from trunnion.views.sweep import figure, tables
 
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
-    _check_figures(grid, x, family, kind)
-    outputs = list(files.out or ())
-    drawn = _figures(files, measures, image)
+    check_kind(kind, KINDS)
+    counts = {name: points({name: values}) for name, values in grid.items()}
+    check_axes(counts, x, family)
+    if kind == "map" and sum(count > 1 for count in counts.values()) < 2:
+        what = "a map needs two names that vary"
+        raise MechanismError(Finding(what, "--kind", "give --over twice, with several values each, or draw curves"))
     check_files(files)
+    if len(measures) > 1 and any(path.suffix.lower() in IMAGES for path in files.out or ()):
+        what = f"{len(measures)} figures do not fit one file"
+        raise MechanismError(Finding(what, "--out", "give one --measure, or write a --report, which has all"))
     mechanism = model.read({name: values[0] for name, values in grid.items()})
     measures_read = check_measure(measures, mechanism)
     with model.lines(), bar("points", points(grid)) as progress:
@@ -68,9 +73,7 @@ def sweep(
     pictured = whole_peaks(result, uncut)
 
     def draw(path: Path) -> Any:
-        if path not in outputs:
-            folder(path.parent)
-        return figure(pictured, drawn[path], x, family, kind)
+        return figure(pictured, measures[0], x, family, kind)
 
     def show() -> None:
         parts = tables(result, measures, x, family, console().width)
@@ -81,48 +84,3 @@ def sweep(
 
     paged = {"measures": measures, "x": x, "family": family, "kind": kind}
     Shown(result, model, files, "assembly", pictured, paged=paged, draw=draw, show=show).finish()
-
-
-def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
-    """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
-    from trunnion.views.charts import check_kind
-    from trunnion.views.scales import KINDS, check_axes
-
-    check_kind(kind, KINDS)
-    counts = {name: points({name: values}) for name, values in grid.items()}
-    check_axes(counts, x, family)
-    if kind == "map" and sum(count > 1 for count in counts.values()) < 2:
-        what = "a map needs two names that vary"
-        raise MechanismError(Finding(what, "--kind", "give --over twice, with several values each, or draw curves"))
-
-
-def _figures(files: Files, measures: Sequence[str], image: str) -> dict[Path, str]:
-    """The measure of each figure to write; a path without extension is a folder, for which its figures come in `out`.
-
-    MechanismError for what cannot be written.
-    """
-    from trunnion.results.export import FORMATS
-
-    drawn: dict[Path, str] = {}
-    out: list[Path] = []
-    for path in files.out or ():
-        kind = path.suffix.lower()
-        if kind in IMAGES and len(measures) > 1:
-            what = f"{len(measures)} figures do not fit one file"
-            remedy = f"--out {path.with_suffix('')} makes a folder with one of each; or give one --measure"
-            raise MechanismError(Finding(what, str(path), remedy))
-        figures = {path: measures[0]} if kind in IMAGES else {}
-        if not figures and kind not in FORMATS and (not kind or path.is_dir()):
-            from trunnion.views.cycle.plots import check_figure  # with matplotlib
-
-            figures = {path / f"{_plain(name)}.{image.lower().lstrip('.')}": name for name in measures}
-            check_figure(next(iter(figures)))
-        drawn |= figures
-        out += list(figures) or [path]
-    files.out = out
-    return drawn
-
-
-def _plain(name: str) -> str:
-    """A measure as the name of a file: signs that some file systems refuse are replaced."""
-    return "".join("_" if sign in '/\\:*?"<>| ' else sign for sign in name)

@@ -56,99 +56,44 @@ def show_figures(title: str, figures: Sequence[Figure]) -> None:
 
 
 def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
-    """Rows of texts under their heads, broken between words where they are too wide, but not before a unit.
+    """Rows of texts under their heads, broken at plain spaces where they are too wide, so that numbers keep units.
 
-    A table whose words do not fit the terminal has narrower gaps between its columns; if that does not help, it is
-    shown in parts, one below the other, each with the columns that name its rows. Where no terminal sets a width, it is
-    as wide as its words need: no number is broken.
+    A table whose words do not fit the terminal is shown in parts, one below the other, each with the columns that name
+    its rows. Where no terminal sets a width, it is as wide as its words need.
     """
+    from textwrap import wrap
+
     from rich.table import Table
 
     line(title, "italic")
-    out = console()
+    out, table = console(), [head, *rows]
+    columns = [(max(len(word) for cell in column for word in cell.split(" ")), max(map(len, column)))
+               for column in zip(*table, strict=True)]  # fmt: skip
     if not out.is_terminal and "COLUMNS" not in os.environ:
-        out.width = max(out.width, sum(_widths([head, *rows])[0]) + _frame(head))
-    gap = next((gap for gap in GAPS if len(_parts([head, *rows], out.width, gap)) == 1), GAPS[0])
-    for number, columns_shown in enumerate(_parts([head, *rows], out.width, gap)):
-        if number:
-            out.print()
-        part = [[row[k] for k in columns_shown] for row in [head, *rows]]
-        cells = _fitted(part, out.width - _frame(part[0], gap))
-        table = Table(show_edge=False, padding=PADDING[gap])
-        for name in cells[0]:
-            table.add_column(name, justify="right", overflow="fold", no_wrap=cells[0] is not part[0])
-        for row in cells[1:]:
-            table.add_row(*row)
-        out.print(table, markup=False, highlight=False)
-
-
-PADDING = {3: (0, 1, 0, 1), 2: (0, 0, 0, 1), 1: (0, 0, 0, 0)}  # of a cell, by how much a column takes beside its text
-GAPS = tuple(PADDING)
-
-
-def _frame(columns: Sequence[Any], gap: int = 3) -> int:
-    """How much of a line the lines and gaps between so many columns take."""
-    return gap * len(columns) - 1
-
-
-def _widths(rows: list[list[str]]) -> tuple[list[int], list[int]]:
-    """How wide each column is at least, by its longest word, and how wide it is by its longest cell."""
-    from rich.cells import cell_len
-
-    columns = list(zip(*rows, strict=True))
-    least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
-    return least, [max(map(cell_len, column)) for column in columns]
-
-
-def _parts(rows: list[list[str]], width: int, gap: int = 3) -> list[list[int]]:
-    """Columns of each table that a table is shown as: all in one if their words fit the width.
-
-    Otherwise each begins with the columns in which every row differs from the others.
-    """
-    least, longest = _widths(rows)
-    if sum(least) + _frame(least, gap) <= width:
-        return [list(range(len(least)))]
-    room = [max(low, min(WIDE, high)) for low, high in zip(least, longest, strict=True)]
-    telling = (k for k in range(1, min(4, len(room))) if len({tuple(row[:k]) for row in rows}) == len(rows))
-    count = next(telling, 1)
-    names = list(range(count))
+        out.width = max(out.width, sum(least + BESIDE for least, _ in columns))
+    telling = (k for k in range(1, min(4, len(head))) if len({tuple(row[:k]) for row in rows}) == len(rows))
+    names = list(range(next(telling, 1)))
     parts = [list(names)]
-    for k in range(count, len(room)):
-        longer = [*parts[-1], k]
-        if len(parts[-1]) > count and sum(room[j] for j in longer) + _frame(longer) > width:
-            parts.append([*names, k])
-        else:
-            parts[-1] = longer
-    return parts
+    for k in range(len(names), len(head)):
+        if sum(columns[j][0] + BESIDE for j in [*parts[-1], k]) > out.width and parts[-1] != names:
+            out.print()
+            parts.append(list(names))
+        parts[-1].append(k)
+    for part in parts:
+        widths, room = [columns[k][1] for k in part], out.width - BESIDE * len(part)
+        while sum(widths) > room and (wide := [i for i, k in enumerate(part) if widths[i] > columns[k][0]]):
+            widths[max(wide, key=widths.__getitem__)] -= 1
+        shown = Table(show_edge=False)
+        cells = [["\n".join(wrap(row[k], width, break_long_words=False, break_on_hyphens=False))
+                  for k, width in zip(part, widths, strict=True)] for row in table]  # fmt: skip
+        for name in cells[0]:
+            shown.add_column(name, justify="right", overflow="fold")
+        for row in cells[1:]:
+            shown.add_row(*row)
+        out.print(shown, markup=False, highlight=False)
 
 
-WIDE = 20  # of a column that is not broken into more lines, where a table is shown in parts
-
-
-def _fitted(rows: list[list[str]], room: int) -> list[list[str]]:
-    """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do, or
-    cannot. rich itself breaks at spaces that are not to be broken, too."""
-    least, widths = _widths(rows)
-    if sum(widths) <= room or sum(least) > room:
-        return rows
-    while sum(widths) > room:
-        widest = max((k for k in range(len(widths)) if widths[k] > least[k]), key=widths.__getitem__)
-        widths[widest] -= 1
-    return [[_broken(cell, width) for cell, width in zip(row, widths, strict=True)] for row in rows]
-
-
-def _broken(text: str, width: int) -> str:
-    """A text in lines no wider than this, broken at plain spaces."""
-    from rich.cells import cell_len
-
-    lines = [""]
-    for word in text.split(" "):
-        longer = f"{lines[-1]} {word}" if lines[-1] else word
-        if cell_len(longer) <= width or not lines[-1]:
-            lines[-1] = longer
-        else:
-            lines.append(word)
-    return "\n".join(lines)
+BESIDE = 3  # what a column takes beside its text
 
 
 def say(findings: Iterable[Finding], every: bool = False) -> None:

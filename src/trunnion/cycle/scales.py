@@ -50,8 +50,8 @@ def largest(run: Run, arrays: Mapping[str, NDArray[np.float64]]) -> Scales:
     if np.any(sound):
         arrays = {name: array[..., sound] for name, array in arrays.items() if array.shape[-1:] == sound.shape}
     joints = [point in system.joints for _, point in system.points]
-    length = max(peak(arrays["point_position"][joints]), peak(arrays["joint_slide"]))
-    length = length or float(np.max(primal(system.size(run.values))))
+    size = float(np.max(primal(system.size(run.values))))  # joints that meet in one point have places of rounding only
+    length = max(size, peak(arrays["point_position"][joints]), peak(arrays["joint_slide"]))
     speed = max(peak(arrays["joint_slide_velocity"]), peak(arrays["point_velocity"][joints]))
     rate = max(peak(arrays["joint_rotation_velocity"]), speed / length) or 1 / (run.cycle.duration or 1.0)
     forces, torques = _stated_forces(run)

@@ -108,7 +108,7 @@ class Draft:
     drives : rate of a driven joint, rad/s or m/s, by its name.
     plane : whether it is known to move in the plane z = 0.
     source : the file it comes from, for the comment on top.
-    findings : what is doubtful or lost.
+    findings : what is doubtful; lost : names of what is left out, by what it is.
     """
 
     name: str = ""
@@ -120,6 +120,11 @@ class Draft:
     plane: bool = False
     source: str = ""
     findings: list[Finding] = field(default_factory=list)
+    lost: dict[str, list[str]] = field(default_factory=dict)
+
+    def lose(self, what: str, *names: str) -> None:
+        """Leave something out: `checked` says in one finding all that is."""
+        self.lost.setdefault(what, []).extend(names)
 
     def warn(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
         """Note a doubt; code: of the list in the manual, `exchange.…`."""
@@ -201,23 +206,23 @@ class Draft:
         return np.asarray(normal * np.sign(normal[largest]), dtype=float)
 
     def checked(self) -> Draft:
-        """The same; MechanismError if a body or pair is not one that a mechanism can have."""
+        """The same, with a finding of all that is left out; MechanismError if a body or pair is none of a mechanism."""
         findings = []
+        if self.lost:
+            named = {what: ", ".join(names[:10]) + " …" * (len(names) > 10) for what, names in self.lost.items()}
+            all_lost = "; ".join(f"{what} ({names})" if names else what for what, names in named.items())
+            self.note("exchange.lost", "", f"is read without {all_lost}", "add to the model what moves or loads it")
         for pair in self.pairs.values():
             if pair.type not in PAIRS:
                 findings.append(Finding(f"has the type {pair.type!r}, which is no pair", f"joints.{pair.name}"))
             numbers = np.concatenate([pair.at, pair.axis])
             if not np.abs(pair.at).max() < FARTHEST:
-                findings.append(
-                    Finding(f"lies {np.abs(pair.at).max():.3g} m away", f"joints.{pair.name}", "mend the file")
-                )
+                what = f"lies {np.abs(pair.at).max():.3g} m away"
+                findings.append(Finding(what, f"joints.{pair.name}", "mend the file"))
             if not np.isfinite(numbers).all() or not np.linalg.norm(pair.axis) > 0:
                 findings.append(Finding("has no place or no axis", f"joints.{pair.name}", "mend the file"))
-            findings += [
-                Finding(f"joins {link!r}, which the file does not have", f"joints.{pair.name}")
-                for link in pair.links
-                if link not in self.bodies
-            ]
+            strange = [link for link in pair.links if link not in self.bodies]
+            findings += [Finding(f"joins {link!r}, which it does not have", f"joints.{pair.name}") for link in strange]
         for body in self.bodies.values():
             if not (np.isfinite(body.mass) and np.isfinite(body.centre).all() and np.isfinite(body.inertia).all()):
                 findings.append(Finding("has a mass, centre or inertia that is no number", f"links.{body.name}"))

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from ezdxf.document import Drawing
     from ezdxf.layouts.layout import Modelspace
 
-    from trunnion.exchange.formats import ExportOptions
-
 __all__ = ["AUXILIARY", "write"]
 
 AUXILIARY = "~"
@@ -44,9 +42,9 @@ def _add_layer(document: Any, name: str, color: int) -> None:
     (document.layers.get(name) if name in document.layers else document.layers.add(name)).color = color
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Draw the links at a position, the curves of named points and, in a plane, the force polygons; in mm."""
-    draft = positions.draft(options.row)
+    draft = positions.draft()
     document = new("R2010", units=InsertUnits.Millimeters)
     _arrow_block(document)
     space = document.modelspace()
@@ -60,7 +58,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     draft.note("exchange.lost", "file", "a DXF holds no masses, friction, loads or drivers", "keep the model file")
     if draft.plane:
         right = float(max(corners[:, 0].max(), *(curve[:, 0].max() for curve in curves), -math.inf))
-        _polygons(space, positions, options.row, draft, np.array([right + 0.5 * size, corners[:, 1].min()]), size)
+        _polygons(space, positions, draft, np.array([right + 0.5 * size, corners[:, 1].min()]), size)
     else:
         draft.note("exchange.spatial", "file", "lines are drawn in space; only planar mechanisms have force polygons")
     document.saveas(path)
@@ -171,11 +169,11 @@ def _curves(space: Modelspace, positions: Positions, layers: dict[str, str], siz
     return curves
 
 
-def _polygons(space: Modelspace, positions: Positions, row: int, draft: Draft, corner: Array, size: float) -> None:
+def _polygons(space: Modelspace, positions: Positions, draft: Draft, corner: Array, size: float) -> None:
     """The polygons in rows from a corner upwards, each group with its links, approximations in grey below them."""
-    drawn = polygons_of(positions, row)
+    drawn = polygons_of(positions)
     if not drawn or not any(len(polygon.forces) for polygon in drawn[0]):
-        draft.note("exchange.forces", "file", f"there are no forces to draw at {positions.drive(row)}")
+        draft.note("exchange.forces", "file", f"there are no forces to draw at {positions.drive(0)}")
         return
     settled = [polygon for polygon in drawn[0] if len(polygon.forces)]
     largest = max(float(np.ptp(polygon.corners, axis=0).max()) for polygon in settled)
@@ -190,7 +188,7 @@ def _polygons(space: Modelspace, positions: Positions, row: int, draft: Draft, c
         low = np.min([shape.corners.min(axis=0) for shape in [polygon, *rounds]], axis=0)
         high = np.max([shape.corners.max(axis=0) for shape in [polygon, *rounds]], axis=0)
         origin = corner - scale * low
-        title = f"{polygon.name}: {1 / scale / MM:.6g} N/mm, drive at {positions.drive(row)}"
+        title = f"{polygon.name}: {1 / scale / MM:.6g} N/mm, drive at {positions.drive(0)}"
         _text(space, title, np.array([*(corner - [0.0, 2 * LETTER * size]), 0.0]), size, {"layer": layer})
         for number, shape in enumerate(rounds):
             _sides(space, shape, origin, scale, 0.0, {"layer": f"{layer} round {number}", "color": GREY})

@@ -7,31 +7,28 @@ layers, and whatever could be read in two ways is a finding.
 from __future__ import annotations
 
 import itertools
-import logging
 import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from logging.handlers import BufferingHandler
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ezdxf import recover
-from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name
-from trunnion.exchange.drawing import AUXILIARY, write
+from trunnion.exchange.drawing import AUXILIARY
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
     from trunnion.exchange.formats import ImportOptions
 
-__all__ = ["read", "write"]
+__all__ = ["read"]
 
 GROUNDS = ("ground", "frame", "base", "fixed")  # words in the name of a layer that does not move; else it is layer 0
 CHAINED = ("CENTER", "DASHDOT", "DIVIDE", "MITTE", "ACAD_ISO04", "ACAD_ISO10")  # how linetypes of centre lines begin
@@ -44,17 +41,8 @@ UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144,
 HALF = 1e-3  # rad, by which a half circle may differ from one
 NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
 # what the library lets through of damaged files; a generator that ends too early is a RuntimeError or a StopIteration
-SPOILT = (
-    DXFError,
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    LookupError,
-    RuntimeError,
-    StopIteration,
-    TypeError,
-    ValueError,
-)
+SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, StopIteration,
+          TypeError, ValueError)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +72,8 @@ class Slot(Line):
 
     def holds(self, at: Array, radius: float, near: float) -> bool:
         """Whether a pin lies on the middle line and fits in."""
-        along, aside = (
-            (at - self.start) @ self.span / self.length,
-            abs(_cross(self.span, at - self.start)) / self.length,
-        )
+        off = at - self.start
+        along, aside = off @ self.span / self.length, abs(_cross(self.span, off)) / self.length
         return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
 
 
@@ -143,9 +129,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
         what = f"is damaged, and {what}" if any(f.code == "exchange.damaged" for f in draft.findings) else what
         remedy = "draw each link on a layer of its own: its pins as circles, lines between them"
         raise MechanismError(Finding(what, file=str(path), remedy=remedy))
-    if sketch.left:
-        left = ", ".join(f"{count} {kind}" for kind, count in sketch.left.most_common(6))
-        draft.note("exchange.left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
+    for kind, count in sketch.left.most_common(6):
+        draft.lose(f"{count} {kind}")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
         draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
@@ -160,18 +145,12 @@ def _document(path: Path, draft: Draft) -> Drawing:
     if objects > MOST_OBJECTS:
         what = f"holds some {objects:,} objects; at most {MOST_OBJECTS:,} are read"
         raise MechanismError(Finding(what, file=str(path), remedy="export the skeleton alone"))
-    heard, logger = BufferingHandler(MOST_OBJECTS), logging.getLogger("ezdxf")
-    logger.addHandler(heard)
-    try:
-        return readfile(path)
-    except SPOILT:
-        document, _ = recover.readfile(path)
-        mended = "; ".join(record.getMessage() for record in heard.buffer[:3])
-        what = "is damaged; what could be mended is read" + (f": {mended}" if mended else "")
+    document, auditor = recover.readfile(path)
+    if auditor.has_errors or auditor.has_fixes:
+        mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
+        what = f"is damaged; what could be mended is read: {mended}"
         draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
-        return document
-    finally:
-        logger.removeHandler(heard)
+    return document
 
 
 def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
@@ -354,8 +333,7 @@ class _Reader:
         for layer in loose:
             del draft.bodies[layer]
             draft.ground = "" if layer == draft.ground else draft.ground
-            what = "has no joint with another layer and is left out"
-            draft.warn("exchange.loose", f"links.{layer}", what, "draw its joints")
+            draft.lose("layer without a joint with another", layer)
         self._names()
 
     def _add(self, kind: str, links: tuple[str, str], number: int, comment: str, axis: Array | None = None) -> Pair:
@@ -388,9 +366,8 @@ class _Reader:
             near = [sorted(both) for both in itertools.product(pins, holes) if abs(both[0] - both[1]) <= self.gap]
             fits = near[0] if len(near) == 1 else pins if len(pins) == 1 and not holes else []
             circles = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*pins, *holes}))
-            pair = self._add(
-                "revolute", (hub, other), number, f"{hub} and {other} share a place; radii: {circles or 'none'}"
-            )
+            comment = f"{hub} and {other} share a place; radii: {circles or 'none'}"
+            pair = self._add("revolute", (hub, other), number, comment)
             pair.pin_radius, pair.hole_radius = [*fits, None, None][:2]
             if circles and not fits:
                 what = f"has circles of {circles} radius, of which none are clearly its pin and hole"
@@ -409,9 +386,8 @@ class _Reader:
         chance: set[frozenset[str]] = set()
         for both in _lying(self.sketch.lines, self.gap):
             layers = frozenset(line.layer for line in both)
-            bodies = [
-                all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line]) for line in both
-            ]
+            bodies = [all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line])
+                      for line in both]  # fmt: skip
             if all(bodies) or any(layers <= self.marks[k].keys() for k in self.joined):
                 continue
             if any(bodies):
@@ -420,15 +396,11 @@ class _Reader:
             for line in both:
                 guided.setdefault(layers, {}).setdefault(line.layer, {})[line] = None
         for layers in sorted(chance - guided.keys(), key=sorted):
-            what = (
-                f"lines of {' and '.join(sorted(layers))} lie on each other, but one ends at joints; no guide is read"
-            )
+            what = f"lines of {' and '.join(sorted(layers))} lie on each other, one between joints: no guide is read"
             draft.note("exchange.line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
         for lines in guided.values():
-            free = {
-                layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
-                for layer, drawn in lines.items()
-            }
+            free = {layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
+                    for layer, drawn in lines.items()}  # fmt: skip
             self._guide({layer: free[layer] or list(lines[layer]) for layer in lines})
         return set(guided)
 
@@ -477,14 +449,11 @@ class _Reader:
         """
         draft, at = self.draft, self.places[number]
         layer, radii = next(iter(self.marks[number].items()))
-        slots = [
-            slot for slot in self.slots if slot.layer != layer and slot.holds(at, min(radii), 10 * TOUCH * self.size)
-        ]
+        radius, slack = min(radii), 10 * TOUCH * self.size
+        slots = [slot for slot in self.slots if slot.layer != layer and slot.holds(at, radius, slack)]
         if len(slots) == 1:
-            slot, radius = slots[0], min(radii)
-            comment = (
-                f"a pin of {layer}, radius {_mm(radius)} mm, in a slot of {slot.layer}, {_mm(2 * slot.half)} mm wide"
-            )
+            slot = slots[0]
+            comment = f"a pin of {layer}, radius {_mm(radius)} mm, in a slot of {slot.layer}, {_mm(2 * slot.half)} mm"
             block = free_name(f"block in {slot.layer}", draft.bodies, "block")
             draft.bodies[block] = Body(block, comments=[f"{comment}: a block without mass lies between them"])
             self._add("revolute", (layer, block), number, comment).pin_radius = radius or None

@@ -11,13 +11,12 @@ from pythonfmu3 import FmuBuilder
 from trunnion.dynamics.continued import Continued
 from trunnion.errors import Finding, Severity, counted
 from trunnion.exchange import fmu_slave
-from trunnion.exchange.formats import ExportOptions
 from trunnion.exchange.skeleton import Positions
 
 __all__ = ["write"]
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the motion of a mechanism; of its positions nothing but the mechanism is looked at."""
     motion = Continued(positions.mechanism)
     with TemporaryDirectory() as folder:

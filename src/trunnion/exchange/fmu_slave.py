@@ -23,7 +23,7 @@ from pythonfmu3 import (
     Fmi3StepResult,
     Fmi3Variability,
     Unit,
-)
+)  # fmt: skip
 
 from trunnion.dynamics.continued import Continued
 from trunnion.dynamics.filling import Books

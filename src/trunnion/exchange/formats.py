@@ -1,7 +1,7 @@
 """The table of file formats: by extension, what reads and what writes them, and the module that does it.
 
-A new format is a module with `read(path, options)`, which returns a Draft, or `write(positions, path, options)`, and
-an entry here.
+A new format is a module with `read(path, options)`, which returns a Draft, or `write(positions, path)`, and
+an entry here. One with `write_moved(positions, path, original)` also moves the parts of the file that a model is of.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from trunnion.model.units import KINDS, Kind, UnitError
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["FORMATS", "MATERIALS", "ExportOptions", "Format", "ImportOptions", "export_model", "import_file"]
+__all__ = ["FORMATS", "MATERIALS", "Format", "ImportOptions", "export_model", "import_file"]
 
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
              "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
@@ -39,31 +39,29 @@ LARGEST = 200_000_000  # bytes of a file that is read
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: its name, the module in `exchange`, whether it is read and written, what it needs installed."""
+    """A file format: its name, and the modules in `exchange` that read and write it; empty if none does."""
 
     name: str
-    module: str
-    reads: bool = True
-    writes: bool = True
-    needs: str = ""
+    reads: str = ""
+    writes: str = ""
 
 
 FORMATS: dict[str, Format] = {
-    ".mjcf": Format("MJCF", "mjcf", needs="defusedxml"),
-    ".sdf": Format("SDF", "sdf", needs="defusedxml"),
-    ".urdf": Format("URDF", "urdf", needs="defusedxml"),
-    ".step": Format("STEP", "step"),
-    ".stp": Format("STEP", "step"),
-    ".dxf": Format("DXF", "dxf"),
-    ".stl": Format("STL", "mesh", writes=False),
-    ".3mf": Format("3MF", "mesh", writes=False),
-    ".glb": Format("glTF", "glb"),
-    ".fcstd": Format("FreeCAD", "freecad", writes=False),
-    ".pmks": Format("PMKS+", "pmks", writes=False),
-    ".url": Format("PMKS+", "pmks", writes=False),
-    ".txt": Format("PMKS+", "pmks", writes=False),
-    ".json": Format("pylinkage", "pylinkage", writes=False),
-    ".fmu": Format("FMU", "fmu", reads=False),
+    ".mjcf": Format("MJCF", "mjcf", "mjcf"),
+    ".sdf": Format("SDF", "sdf", "sdf"),
+    ".urdf": Format("URDF", "urdf", "urdf"),
+    ".step": Format("STEP", "step", "step"),
+    ".stp": Format("STEP", "step", "step"),
+    ".dxf": Format("DXF", "dxf", "drawing"),
+    ".stl": Format("STL", "mesh"),
+    ".3mf": Format("3MF", "mesh"),
+    ".glb": Format("glTF", "mesh", "glb"),
+    ".fcstd": Format("FreeCAD", "freecad"),
+    ".pmks": Format("PMKS+", "pmks"),
+    ".url": Format("PMKS+", "pmks"),
+    ".txt": Format("PMKS+", "pmks"),
+    ".json": Format("pylinkage", "pylinkage"),
+    ".fmu": Format("FMU", writes="fmu"),
 }
 
 
@@ -86,21 +84,6 @@ class ImportOptions:
     drive: str = ""
     unit: float = 1e-3
     unit_stated: bool = False
-
-
-@dataclass(frozen=True)
-class ExportOptions:
-    """How a file is written.
-
-    Parameters
-    ----------
-    row : of the position, for formats of one position; frames : of those that move.
-    original : the file that the model was imported from, for formats that move its parts.
-    """
-
-    row: int = 0
-    frames: int = 120
-    original: Path | None = None
 
 
 def _format_of(path: Path, reads: bool) -> Format:
@@ -135,10 +118,10 @@ def _readable(path: Path) -> Iterator[None]:
         raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
 
 
-def _module(entry: Format, path: Path) -> Any:
-    """The module of a format; MechanismError that names the extra if a library is missing."""
+def _module(entry: Format, name: str, path: Path) -> Any:
+    """A module of a format; MechanismError that names the extra if a library is missing."""
     try:
-        return import_module(f"trunnion.exchange.{entry.module}")
+        return import_module(f"trunnion.exchange.{name}")
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("trunnion"):
             raise
@@ -177,14 +160,8 @@ def import_file(
     """
     path = Path(path)
     heaviness = _material(material) if density is None else _number(density, "density", KINDS["density"])
-    options = ImportOptions(
-        ground,
-        heaviness,
-        _number(gap, "gap", KINDS["length"]),
-        drive,
-        _number(f"1 {unit}", "unit", KINDS["length"]),
-        unit != "mm",
-    )
+    largest, length = _number(gap, "gap", KINDS["length"]), _number(f"1 {unit}", "unit", KINDS["length"])
+    options = ImportOptions(ground, heaviness, largest, drive, length, unit != "mm")
     rate, turns = _speed(speed)
     if str(path).startswith(LINKS):
         draft = import_module("trunnion.exchange.pmks").read_link(str(path), options)
@@ -204,7 +181,7 @@ def _read(path: Path, options: ImportOptions) -> Draft:
     if not size or size > LARGEST:
         what = "is empty" if not size else f"has {size:,} bytes; at most {LARGEST:,} are read"
         raise MechanismError(Finding(what, file=str(path), remedy="export the mechanism again, with fewer parts"))
-    module = _module(entry, path)
+    module = _module(entry, entry.reads, path)
     try:
         with _readable(path):
             draft: Draft = module.read(path, options)
@@ -277,9 +254,9 @@ def export_model(
     ------
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
-    path, options = Path(path), ExportOptions(0, frames, None if original is None else Path(original))
+    path = Path(path)
     entry = _format_of(path, reads=False)
-    module = _module(entry, path)
+    module = _module(entry, entry.writes, path)
     moves = getattr(module, "MOVES", False)
     if magnify != 1 and not getattr(module, "MAGNIFIES", False):
         what = f"a model in {entry.name} has the mechanism's own places; they are not magnified"
@@ -288,12 +265,16 @@ def export_model(
         raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
     span = (frames, None) if moves else (FEWEST, at)
     positions = positions_of(mechanism, *span, magnify=magnify)
-    if options.original is not None:
-        if not getattr(module, "MOVES_PARTS", False):
-            raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
-        reading(options.original)
-        with _readable(options.original):
-            options.original.open("rb").close()
+    if original is None:
+        with whole(path) as temporary:
+            findings: list[Finding] = module.write(positions, temporary)
+        return findings
+    if not hasattr(module, "write_moved"):
+        raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
+    source = Path(original)
+    reading(source)
+    with _readable(source):
+        source.open("rb").close()
     with whole(path) as temporary:
-        findings: list[Finding] = module.write(positions, temporary, options)
+        findings = module.write_moved(positions, temporary, source)
     return findings

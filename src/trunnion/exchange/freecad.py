@@ -45,7 +45,6 @@ PROPERTIES = {
     "JointType", "Reference1", "Reference2", "Placement1", "Placement2", "Activated", "Suppressed",
     *(f"{enable}{key}{end}" for enable in ("", "Enable") for key in ("Length", "Angle") for end in ("Min", "Max")),
 }  # fmt: skip
-OTHERS = {"SolverId": "Assembly3 or Assembly4", "AssemblyType": "Assembly4", "a2p_Version": "A2plus"}
 
 
 @dataclass
@@ -96,22 +95,17 @@ class DocumentObject:
 
 def read(path: Path, options: ImportOptions) -> Draft:
     """Read the assembly of a file."""
-    objects, others = _document(path)
+    objects = _document(path)
     assemblies = [each for each in objects.values() if each.type == ASSEMBLY]
     inner = {name for assembly in assemblies for name in assembly.links("Group")}
     outer = [assembly for assembly in assemblies if assembly.name not in inner]
     if not outer:
-        what = "has no assembly of FreeCAD 1.0 or later"
-        what += f", but one of {' and '.join(others)}, whose attachments are not joints" if others else ""
+        what = "has no assembly of FreeCAD 1.0 or later, such as Assembly4 and A2plus do not make"
         raise MechanismError(Finding(what, file=str(path), remedy="join the parts in FreeCAD's Assembly workbench"))
     draft = Draft(outer[0].label)
     if len(outer) > 1:
-        draft.warn(
-            "exchange.assemblies",
-            "",
-            f"{outer[0].label} is read of {len(outer)} assemblies",
-            "keep the others in files",
-        )
+        what = f"{outer[0].label} is read of {len(outer)} assemblies"
+        draft.warn("exchange.assemblies", "", what, "keep the others in files")
     try:
         _Assembly(objects, outer[0], draft).read()
     except (ValueError, KeyError, IndexError):
@@ -119,14 +113,12 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if not draft.pairs:
         raise MechanismError(Finding("has no joint between two parts that is read", file=str(path)))
     what = f"masses of {len(draft.bodies)} parts are not read: they follow from shapes that only FreeCAD knows"
-    draft.note(
-        "exchange.masses", "links", what, "write mass, centre and inertia of each link, or import the parts as STEP too"
-    )
+    draft.note("exchange.masses", "links", what, "write those of each link, or import the parts as STEP too")
     return draft
 
 
-def _document(path: Path) -> tuple[dict[str, DocumentObject], list[str]]:
-    """The objects of a file by name, and other programs whose assemblies it has."""
+def _document(path: Path) -> dict[str, DocumentObject]:
+    """The objects of a file by name."""
     what, remedy = "is damaged, or no file of FreeCAD", "save it with FreeCAD"
     try:
         with zipfile.ZipFile(path) as archive:
@@ -146,22 +138,21 @@ def _document(path: Path) -> tuple[dict[str, DocumentObject], list[str]]:
     raise MechanismError(Finding(what, file=str(path), remedy=remedy))
 
 
-def _objects(stream: Any) -> tuple[dict[str, DocumentObject], list[str]]:
+def _objects(stream: Any) -> dict[str, DocumentObject]:
     """The objects of a document, read as it comes so that what is not wanted takes no memory."""
-    types, objects, others = dict[str, str](), dict[str, DocumentObject](), dict[str, None]()
+    types, objects = dict[str, str](), dict[str, DocumentObject]()
     for count, (_, element) in enumerate(iterparse(stream)):
         if count > MOST:
             raise OverflowError
         name = element.get("name", "")
         if element.tag == "Property" and name not in PROPERTIES:
-            others |= dict.fromkeys([OTHERS[name]] if name in OTHERS else [])
             element.clear()
         elif element.tag == "Object" and element.get("type"):
             types[name] = element.get("type", "")
         elif element.tag == "Object":
             properties = {each.get("name", ""): each for each in element.iter("Property")}
             objects[name] = DocumentObject(name, types.get(name, ""), properties)
-    return objects, list(others)
+    return objects
 
 
 class _Assembly:
@@ -187,7 +178,7 @@ class _Assembly:
                 self._joint(each)
         loose = [each.label for each in members if each.name not in self.bodies and each.type not in INERT]
         if loose:
-            draft.note("exchange.loose", "links", f"{', '.join(loose[:9])} have no joint and are left out", "join them")
+            draft.lose("parts without a joint", *loose)
         places = np.array([frame[:3, 3] for both in self.frames.values() for frame in both])
         size = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
         for name, (first, second) in self.frames.items():
@@ -225,9 +216,8 @@ class _Assembly:
                 frame = frame @ target.frame("LinkPlacement", "Placement")
             if part.first("LinkedObject").get("file") and len(path) > k + 2:
                 what = f"joins a part in another file, {'.'.join(path)}: where it lies in that is not known"
-                self.draft.warn(
-                    "exchange.outside", f"joints.{joint.label}", what, "look at its place, or join the part itself"
-                )
+                remedy = "look at its place, or join the part itself"
+                self.draft.warn("exchange.outside", f"joints.{joint.label}", what, remedy)
             inside = self.objects.get(path[k + 1]) if len(path) > k + 1 else None
             if target.type == BODY and inside is not None and inside.type in IN_BODIES:
                 frame = frame @ inside.frame("Placement")
@@ -245,21 +235,16 @@ class _Assembly:
 
     def _joint(self, joint: DocumentObject) -> None:
         """Add the pair of a joint, or tell why there is none."""
-        draft, where = self.draft, f"joints.{joint.label}"
+        draft = self.draft
         kinds = [text.get("value", "") for text in joint.properties["JointType"].iter("Enum")] or TYPES
         kind = kinds[int(joint.value("JointType", "0"))]
         (part, first), (mate, second) = self._connector(joint, "1"), self._connector(joint, "2")
         if not joint.on("Activated", "true") or joint.on("Suppressed"):
-            draft.note(
-                "exchange.inactive", where, "is not active, and left out", "activate it in FreeCAD if it is meant"
-            )
+            draft.lose("joints that are not active", joint.label)
         elif kind not in PAIRS:
-            what = f"is of the kind {kind}, which is no pair, and is left out"
-            draft.warn(
-                "exchange.joint", where, what, "add what it holds to the model, a gear, rack or screw under gears"
-            )
+            draft.lose(f"joints of the kind {kind}, which is no pair", joint.label)
         elif not part or not mate or part == mate:
-            draft.warn("exchange.open", where, "does not join two parts, and is left out", "give it two connectors")
+            draft.lose("joints that do not join two parts", joint.label)
         else:
             name = free_name(joint.label, draft.pairs)
             pair = Pair(name, PAIRS[kind], (self._body(part), self._body(mate)), second[:3, 3], first[:3, 2])

@@ -1,7 +1,6 @@
 """An animated glTF (GLB) of a mechanism for any viewer: a node for each link, its poses as keys over the cycle.
 
-The solids are rods between the joints and cylinders as pins; they show the motion, not the parts. Meshes of a GLB are
-read by `exchange.mesh`.
+The solids are rods between the joints and cylinders as pins; they show the motion, not the parts.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import json
 import math
 import struct
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,10 +19,7 @@ from trunnion.exchange.draft import Array, Draft, Pair, perpendicular
 from trunnion.exchange.skeleton import Positions
 from trunnion.version import __version__
 
-if TYPE_CHECKING:
-    from trunnion.exchange.formats import ExportOptions, ImportOptions
-
-__all__ = ["MOVES", "read", "write"]
+__all__ = ["MOVES", "write"]
 
 MOVES = True  # it takes the whole cycle
 MAGNIFIES = True
@@ -35,14 +31,7 @@ FLOAT, INDEX = 5126, 5125  # component types of glTF: float32, unsigned int32
 Z_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]  # turns a model whose z is up to glTF, whose y is
 
 
-def read(path: Path, options: ImportOptions) -> Draft:
-    """The bodies of a GLB, as `mesh.read`."""
-    from trunnion.exchange.mesh import read as read_meshes
-
-    return read_meshes(path, options)
-
-
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the links with their poses at all solved positions of the cycle."""
     solved = np.all([np.isfinite(origin).all(axis=1) for origin in positions.origins.values()], axis=0)
     if not solved.any():

@@ -17,10 +17,10 @@ import numpy as np
 
 from trunnion.errors import MechanismError
 from trunnion.exchange.brep import Face
-from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name, perpendicular
+from trunnion.exchange.draft import Array, Draft, Pair, free_name, perpendicular
 from trunnion.joints.fits import fit, limits
 
-__all__ = ["joined", "loose_contacts"]
+__all__ = ["joined"]
 
 ANGLE = 1e-4  # rad, between axes or planes that count as parallel
 NEAR = 1e-6  # m, between places that count as equal
@@ -184,13 +184,6 @@ def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
         pass
     mechanism.unconnected()
     mechanism.pairs()
-
-
-def loose_contacts(faces: dict[str, list[Face]], gap: float) -> int:
-    """Number of pins with play between solids."""
-    draft = Draft(bodies={name: Body(name) for name in faces})
-    contacts = _contacts(draft, Groups(draft), _rounds(faces, "cylinder"), gap)
-    return sum(contact.play > NEAR for contact in contacts)
 
 
 # ---- features -------------------------------------------------------------------------------------------------
@@ -553,11 +546,8 @@ class _Held:
                     links.update(dict.fromkeys(united, united))
             main = links[self.groups(draft.ground)] if draft.ground else max(links.values(), key=len)
             apart = [body for body in bodies if body not in main]
-            touching = [
-                (self.groups(facing.bodies[0]), self.groups(facing.bodies[1]))
-                for facing in self.facings
-                if facing.gap <= NEAR and len(main & {self.groups(body) for body in facing.bodies}) == 1
-            ]
+            flush = [tuple(map(self.groups, facing.bodies)) for facing in self.facings if facing.gap <= NEAR]
+            touching = [pair for pair in flush if (pair[0] in main) != (pair[1] in main)]
             if not apart or not touching:
                 break
             left, other = touching[0] if touching[0][0] in main else touching[0][::-1]
@@ -599,7 +589,6 @@ class _Held:
 
     def _turning(self, left: str, other: str, contacts: list[Contact]) -> Pair:
         """The pair of pins on one axis, or on several parallel ones that only slide."""
-        draft = self.draft
         axis = contacts[0].hole.axis
         stops = self.stops(left, other, axis)
         if len(self.lines(contacts)) > 1:
@@ -608,24 +597,10 @@ class _Held:
         elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
             pair = _pair("prismatic", contacts)
             pair.comments.append("its axis lies in the plane of the mechanism: it slides")
-            what = f"the pin between {left} and {other} lies in the plane of the mechanism: it slides and does not turn"
-            draft.note("exchange.slides", f"links.{other}", what, "draw end faces that hold it if it turns")
         else:
             pair = _pair("revolute" if stops == 2 or self.plane is not None else "cylindrical", contacts)
             if stops < 2:
                 pair.comments.append(f"end faces hold it in {('neither direction', 'one direction only')[stops]}")
-        sizes = {round(contact.pin.radius / NEAR) for contact in contacts}
-        plays = {round(contact.play / 1e-9) for contact in contacts}
-        if len(sizes) > 1 or len(plays) > 1:
-            what = f"has {len(contacts)} bearings of different sizes; the joint has those of the longest"
-            draft.warn("exchange.bearings", f"joints.{left}-{other}", what, "see the comments of the joint")
-        if stops == 1 and pair.type == "cylindrical":
-            what = f"the pin between {left} and {other} is held in one direction only: the joint is cylindrical"
-            draft.warn("exchange.stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
-        apart = max(_eccentricity(contact) for contact in contacts)
-        if apart > NEAR:
-            what = f"pin and hole between {left} and {other} lie {1e3 * apart:.3g} mm apart; the joint is at the hole"
-            draft.note("exchange.eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
         return pair
 
     def _sliding(self, left: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
@@ -676,12 +651,6 @@ def _pair(kind: str, contacts: list[Contact]) -> Pair:
     if kind in ("revolute", "cylindrical"):
         pair.comments.append(_nearest_fit(main))
     return pair
-
-
-def _eccentricity(contact: Contact) -> float:
-    """Distance of a pin's axis from its hole's, m."""
-    off = contact.pin.point - contact.hole.point
-    return float(np.linalg.norm(off - (off @ contact.hole.axis) * contact.hole.axis))
 
 
 def _nearest_fit(contact: Contact) -> str:

@@ -57,12 +57,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
             what = f"an STL states no unit; {1e3 * options.unit:g} mm is taken for 1"
             if not options.unit_stated:
                 draft.warn("exchange.unit", "file", what, "state it with --unit")
-            meshes = [
-                (
-                    path.stem,
-                    *_triangles(trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type="stl"), options.unit),
-                )
-            ]
+            mesh = trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type="stl")
+            meshes = [(path.stem, *_triangles(mesh, options.unit))]
         else:
             scene = trimesh.load_scene(io.BytesIO(path.read_bytes()), file_type="glb")
             meshes = [(mesh.metadata.get("name", "part"), *_triangles(mesh, 1.0)) for mesh in scene.dump()]
@@ -70,22 +66,15 @@ def read(path: Path, options: ImportOptions) -> Draft:
         if isinstance(error, MechanismError):
             raise
         raise MechanismError(Finding("cannot be read as a mesh, or is damaged", file=str(path))) from None
-    empty = not any(len(faces) for _, _, faces in meshes)
-    if empty or len(meshes) > MOST_BODIES:
-        what = (
-            "holds no triangles, or is cut off"
-            if empty
-            else f"holds {len(meshes)} meshes; at most {MOST_BODIES} are read"
-        )
+    if not any(len(faces) for _, _, faces in meshes) or len(meshes) > MOST_BODIES:
+        what = f"holds no triangles, is cut off, or holds more than {MOST_BODIES} meshes"
         raise MechanismError(Finding(what, file=str(path)))
     draft.ground = "ground"
     draft.bodies["ground"] = Body("ground")
     for name, vertices, faces in meshes:
         body = _weighed(draft, free_name(name, draft.bodies), vertices, faces, options.density)
         draft.bodies[body.name] = body
-    draft.note(
-        "exchange.joints", "file", "a mesh holds no joints", "copy the links into a model, or import a STEP file"
-    )
+    draft.note("exchange.joints", "file", "a mesh holds no joints", "copy the links into a model, or import STEP")
     return draft
 
 
@@ -148,9 +137,8 @@ def _of_3mf(path: Path) -> Iterator[Mesh]:
         name = part.get("name") or f"part {number}"
         for mesh in part.iterfind("{*}mesh"):
             corners = [[float(v.get(k, "nan")) for k in "xyz"] for v in mesh.iterfind("{*}vertices/{*}vertex")]
-            faces = [
-                [int(t.get(k, "-1")) for k in ("v1", "v2", "v3")] for t in mesh.iterfind("{*}triangles/{*}triangle")
-            ]
+            corners_of = mesh.iterfind("{*}triangles/{*}triangle")
+            faces = [[int(t.get(k, "-1")) for k in ("v1", "v2", "v3")] for t in corners_of]
             vertices, triangles = np.array(corners).reshape(-1, 3), np.array(faces, int).reshape(-1, 3)
             if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(vertices):
                 raise ValueError("a triangle without a corner")

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
 from trunnion.exchange.draft import Array, Body, Draft, Pair, about, united
-from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import (
     APART,
     WORLD,
@@ -58,11 +58,10 @@ def read(path: Path, options: ImportOptions) -> Draft:
     reader.find_drives()
     for tag in ("contact", "tendon"):
         for part in root.iterfind(f"{tag}/*"):
-            reader.lost[tag].append(part.get("name", part.tag))
+            draft.lose(tag, part.get("name", part.tag))
     for tag in BRINGS:
-        if count := sum(1 for _ in root.iter(tag)):
-            what = f"{count} of <{tag}> and the bodies in it are not read"
-            draft.warn("exchange.brings", "", what, "save the model by MuJoCo, which writes it in full")
+        if root.find(f".//{tag}") is not None:
+            draft.lose(f"<{tag}> and the bodies in it, which MuJoCo writes in full when it saves the model")
     return reader.settled(WORLD, options.ground)
 
 
@@ -165,9 +164,8 @@ class _Reader(Scene):
         limited = values.get("limited", "auto")
         automatic = limited == "auto" and self.compiler.get("autolimits") != "false"
         if "range" in values and kind != "ball" and (limited == "true" or automatic):
-            ends = numbers(values["range"], f"range of {where}", 2) - numbers(
-                values.get("ref"), f"ref of {where}", 1, (0,)
-            )
+            ends = numbers(values["range"], f"range of {where}", 2)
+            ends = ends - numbers(values.get("ref"), f"ref of {where}", 1, (0,))
             low, high = ends * (self.angle if kind == "hinge" else 1.0)
             pair.limits = float(low), float(high)
         self._note_lost("joint", values, name)
@@ -176,7 +174,7 @@ class _Reader(Scene):
     def _note_lost(self, tag: str, values: Mapping[str, str], name: str) -> None:
         for key in IGNORED[tag]:
             if values.get(key, "0").strip() not in ("0", "false"):
-                self.lost[key].append(name)
+                self.draft.lose(key, name)
 
     # Frames and masses
 
@@ -214,7 +212,8 @@ class _Reader(Scene):
         """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
         draft, source = self.draft, self.compiler.get("inertiafromgeom", "auto")
         bodies = draft.bodies
-        self.lost["shape"] += [name for name in self.geoms if name != WORLD]
+        if shaped := [name for name in self.geoms if name != WORLD]:
+            draft.lose("shape", *shaped)
         low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
         unknown = []
         for name, geoms in self.geoms.items() if source != "false" else ():
@@ -242,7 +241,7 @@ class _Reader(Scene):
             values = self._with_defaults(part, "main")
             name = values.get("name") or f"loop{number + 1}"
             if values.get("active") == "false":
-                self.lost["equality that is not active"].append(name)
+                draft.lose("equality that is not active", name)
             elif part.tag in ("connect", "weld"):
                 links, place = self._ends(values, f"equality {name}")
                 if part.tag == "weld":
@@ -253,7 +252,7 @@ class _Reader(Scene):
                 _, ratio, *higher = numbers(values.get("polycoef"), f"polycoef of {name}", 5, (0, 1, 0, 0, 0))
                 self.couplings.append((values["joint1"], values["joint2"], 0.0 if any(higher) else float(ratio)))
             else:
-                draft.warn("exchange.equality", name, f"is an equality of the kind {part.tag!r}, which is not read")
+                draft.lose(f"equality of the kind {part.tag!r}", name)
         for links, points in shared.items():
             offsets = np.array([place for _, place in points]) - points[0][1]
             rank = int((np.linalg.svd(offsets, compute_uv=False) > APART).sum())
@@ -298,7 +297,7 @@ class _Reader(Scene):
             values = self._with_defaults(part, "main")
             joint, rate = values.get("joint", values.get("jointinparent")), 0.0
             if joint not in self.draft.pairs:
-                self.lost["actuator"].append(values.get("name", part.tag))
+                self.draft.lose("actuator", values.get("name", part.tag))
                 continue
             if part.tag == "velocity" and number < len(control):
                 gear = numbers(values.get("gear"), f"gear of {joint}", 0, (1,))[0]
@@ -354,13 +353,13 @@ def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
 STEP = 0.001  # s, of the simulation
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the mechanism as MJCF: bodies with the global axes, each with its origin at the joint that carries it.
 
     A loop is closed at a ball by one `connect`, at a pin by two on its axis; at any other joint the body after it is
     halved, and a `weld` holds its halves together, so mass and mobility stay.
     """
-    draft = opening(positions, options.row)
+    draft = opening(positions)
     tree, cuts = spanning(draft)
     root = Element("mujoco", model=draft.name or "mechanism")
     compiler = SubElement(root, "compiler", angle="radian", autolimits="true")

@@ -169,21 +169,14 @@ def _draft(text: str, file: str) -> Draft:
     meet(draft, list(_pins(joints, links, bodies, (length, mass, *speeds))))
     weighed = any(body.mass > 0 for body in draft.bodies.values())
     if weighed:
-        draft.note(
-            "exchange.unit",
-            "links",
-            f"masses and lengths are taken in {unit}",
-            "mend the masses if the file means others",
-        )
+        what = f"masses and lengths are taken in {unit}"
+        draft.note("exchange.unit", "links", what, "mend the masses if the file means others")
     if weighed and not settings["flags"] & WEIGHTLESS:
         draft.gravity = np.array([0.0, -9.81, 0.0])
     if forces:
-        draft.note("exchange.forces", "loads", f"{len(forces)} forces are not read", "state them as loads")
-    lost = [entry for entry in extras if entry[0] not in "PJLFCSK"]
-    if lost:
-        draft.warn(
-            "exchange.extras", "", f"{len(lost)} records are not read, such as gears and holds", "add them to the model"
-        )
+        draft.lose(f"{len(forces)} forces")
+    if lost := [entry for entry in extras if entry[0] not in "PJLFCSK"]:
+        draft.lose(f"{len(lost)} records such as gears and holds")
     return draft
 
 

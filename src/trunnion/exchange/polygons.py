@@ -56,12 +56,12 @@ class Polygon:
 
 
 @np.errstate(all="ignore")  # a position without forces has no polygon
-def polygons_of(positions: Positions, row: int = 0) -> list[list[Polygon]]:
-    """The force polygons of all groups of a planar mechanism, and of their links, at a position.
+def polygons_of(positions: Positions) -> list[list[Polygon]]:
+    """The force polygons of all groups of a planar mechanism, and of their links, at the first of its positions.
 
     Parameters
     ----------
-    positions : where the mechanism is. row : the position.
+    positions : where the mechanism is.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def polygons_of(positions: Positions, row: int = 0) -> list[list[Polygon]]:
         the rounds of successive approximation that lead there, without friction first; an unsolved position has none.
     """
     run = prepare(positions.mechanism)
-    time = np.array([float(positions.result["time"].values[row])])
+    time = np.array([float(positions.result["time"].values[0])])
     if run.seats:  # pins that their loads seat have no approximations: seats and reactions settle together
         backs = [seating_of(run, FrictionMethod()).at(time).back]
     else:

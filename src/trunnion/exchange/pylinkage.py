@@ -1,4 +1,4 @@
-"""pylinkage: the JSON of a mechanism (joints and links), and that of a linkage of older versions (joints by joints)."""
+"""pylinkage: the JSON of a mechanism, with its joints and links."""
 
 from __future__ import annotations
 
@@ -16,21 +16,12 @@ from trunnion.model.names import nearest
 
 __all__ = ["read"]
 
-# kinds of joints of a linkage, with the bars by which they hang: each joins the joints of these keys and the new one
-OLD: dict[str, list[tuple[str, ...]]] = {
-    "Static": [],
-    "Crank": [("joint0",)],
-    "Fixed": [("joint0", "joint1")],
-    "Revolute": [("joint0",), ("joint1",)],
-    "Linear": [("joint0",)],
-    "Prismatic": [("joint0",)],
-}
 LARGEST = 10_000_000  # bytes of a file
 Item = Mapping[str, Any]
 
 
 def read(path: Path, options: ImportOptions) -> Draft:
-    """Read what `mechanism_to_json` or, of older versions, `Linkage.to_json` has written."""
+    """Read what `mechanism_to_json` has written."""
     if path.stat().st_size > LARGEST:
         raise _wrong(f"has more than {LARGEST:,} bytes", str(path))
     try:
@@ -47,8 +38,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     draft = Draft(str(data.get("name") or ""), {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
     draft.note("exchange.unit", "", f"lengths are taken in units of {options.unit:g} m", "state another with --unit")
     try:
-        old = any(joint.get("type") in OLD for joint in joints)
-        pins = _linkage(draft, joints, options.unit) if old else _mechanism(draft, data, options.unit)
+        pins = _mechanism(draft, data, options.unit)
     except MechanismError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, IndexError):
@@ -105,53 +95,3 @@ def _mechanism(draft: Draft, data: Item, unit: float) -> dict[str, PlanarPin]:
         shared = [name for name in pins[first].bodies if name in pins[second].bodies]
         pin.bodies += shared[:1]
     return pins
-
-
-class _Bars:
-    """The pins of a linkage, each of which hangs by bars on others."""
-
-    def __init__(self, draft: Draft, unit: float) -> None:
-        self.draft, self.unit, self.pins = draft, unit, dict[str, PlanarPin]()
-
-    def pin(self, joint: Item) -> PlanarPin:
-        """The pin of a joint, or of a fixed one that another joint holds."""
-        name = str(joint["name"] or f"{joint['x']} {joint['y']}")
-        if name not in self.pins:
-            self.pins[name] = PlanarPin(name, _place(name, (joint["x"], joint["y"]), self.unit))
-            if joint.get("type") == "Static":
-                self.pins[name].bodies.append(GROUND)
-        return self.pins[name]
-
-    def of(self, joint: Item, key: str) -> PlanarPin:
-        """The pin that a joint refers to."""
-        other = joint[key]
-        return self.pin(other) if other.get("inline") else self.pins[_one_of(other["ref"], self.pins)]
-
-    def bar(self, *ends: PlanarPin) -> str:
-        """The body of some pins: of three that which has the first two, if there is one, else a new one."""
-        shared = [body for body in ends[0].bodies if body in ends[1].bodies]
-        name = shared[0] if len(ends) > 2 and shared else ""
-        if not name:
-            name = free_name("-".join(end.name for end in ends), self.draft.bodies)
-            self.draft.bodies[name] = Body(name)
-        for end in ends:
-            end.bodies += [name] * (name not in end.bodies)
-        return name
-
-
-def _linkage(draft: Draft, joints: Sequence[Item], unit: float) -> dict[str, PlanarPin]:
-    """The pins of a linkage, joint by joint."""
-    bars = _Bars(draft, unit)
-    pins = [bars.pin(joint) for joint in joints]
-    for joint, pin in zip(joints, pins, strict=True):
-        kind = joint["type"]
-        for keys in OLD[kind]:
-            bars.bar(*(bars.of(joint, key) for key in keys), pin)
-        if kind == "Crank":
-            bars.of(joint, "joint0").drive = 0.0
-        elif kind in ("Linear", "Prismatic"):
-            first, second = bars.of(joint, "joint1"), bars.of(joint, "joint2")
-            shared = [body for body in first.bodies if body in second.bodies]
-            pin.carrier = shared[0] if shared else bars.bar(first, second)
-            pin.direction = [end - begin for begin, end in zip(first.at, second.at, strict=True)]
-    return bars.pins

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -215,9 +214,9 @@ def laid_out(
     return origins, inner, closing, rates
 
 
-def opening(positions: Positions, row: int, also: str = "") -> Draft:
+def opening(positions: Positions, also: str = "") -> Draft:
     """The draft to write, with notes on what the format cannot hold."""
-    draft, mechanism = positions.draft(row), positions.mechanism
+    draft, mechanism = positions.draft(), positions.mechanism
     places = (path.split(".") for path, value in mechanism.parameters().items() if np.any(primal(value)))
     entries = {place[2] for place in places if place[0] == "joints" and place[-1] != "pair_factor"}
     lost = [name for name in LOST if getattr(mechanism, name)] + sorted(entries - {"pitch"})
@@ -268,14 +267,12 @@ class Scene:
     draft : bodies, pairs and drives by their names in the file.
     between : bodies that are only there to hold two joints of a row.
     couplings : pairs of joints of which the first moves by a ratio of the second.
-    lost : names of the parts of which something is not read, by what that is.
     """
 
     def __init__(self, name: str) -> None:
         self.draft = Draft(name)
         self.between: set[str] = set()
         self.couplings: list[tuple[str, str, float]] = []
-        self.lost: dict[str, list[str]] = defaultdict(list)
 
     def add_body(self, name: str) -> Body:
         """A new body."""
@@ -304,8 +301,6 @@ class Scene:
         if max(len(draft.bodies), len(draft.pairs)) > MOST_PARTS:
             what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
             raise refused(what, remedy="export the mechanism alone")
-        if lost := [f"{key} of {_listed(names)}" for key, names in self.lost.items() if names]:
-            draft.note("exchange.lost", "", f"is read without {'; '.join(lost)}")
         for first, second, ratio in self.couplings:
             self._couple(first, second, ratio)
         self._join()

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
 from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair
-from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import (
     WORLD,
     Frame,
@@ -54,7 +54,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     for number, model in enumerate(models):
         reader.add_model(model, f"{model.get('name', number)}::" if number else "", WORLD)
     if root.find(".//include") is not None:
-        draft.warn("exchange.brings", "", "models that it includes are not read", "write it in full by `gz sdf -p`")
+        draft.lose("models that it includes, which `gz sdf -p` writes in full")
     reader.add_joints()
     return reader.settled(WORLD, options.ground)
 
@@ -94,7 +94,7 @@ class Reader(Scene):
                 rate = numbers(part.findtext("initial_velocity"), f"initial_velocity of {name}", 1, (0,))
                 self.draft.drives[prefix + part.findtext("joint_name", "").strip()] = float(rate[0])
             elif part.tag == "plugin":
-                self.lost["plugin"].append(part.get("name", ""))
+                self.draft.lose("plugin", part.get("name", ""))
         for part in model.findall("joint"):  # its name may also be that of a link, in URDF and old files
             name = prefix + part.get("name", "joint")
             self.poses.setdefault(name, (Frame(), f"joint {name}"))
@@ -102,7 +102,7 @@ class Reader(Scene):
             name = prefix + link.get("name", "link")
             self._weigh(link, name)
             if link.find("visual") is not None or link.find("collision") is not None:
-                self.lost["shape"].append(name)
+                self.draft.lose("shape", name)
             if (model.findtext("static") or "").strip() in YES:
                 self.add_pair(Pair(f"{name}.static", "fixed", (WORLD, name), np.zeros(3)))
 
@@ -147,20 +147,12 @@ class Reader(Scene):
     def add_joints(self) -> None:
         """Make pairs of the joints that were collected, and points of the frames."""
         bodies = self.draft.bodies
-        if (
-            any(end_of(part, tag) == WORLD for part, _ in self.joints for tag in ("parent", "child"))
-            or self.draft.pairs
-        ):
+        ends = {end_of(part, tag) for part, _ in self.joints for tag in ("parent", "child")}
+        if WORLD in ends or self.draft.pairs:
             bodies.setdefault(WORLD, Body(WORLD))
         for part, prefix in self.joints:
             if part.get("type") == "gearbox":
-                draft = self.draft
-                draft.warn(
-                    "exchange.gears",
-                    f"joints.{part.get('name')}",
-                    "is a gearbox, which is not read",
-                    "state it under gears",
-                )
+                self.draft.lose("gearbox", part.get("name", ""))
             elif part.get("type") != "floating":
                 self.add_pair(self._pair(part, prefix))
             mimic = part.find("axis/mimic")
@@ -192,7 +184,7 @@ class Reader(Scene):
                 raise refused(f"joins {end!r}, which is no link of the file", where)
         for key in ("damping", "friction", "spring_stiffness"):
             if any(numbers(value.text, f"{key} of {where}", 1, (0,))[0] for value in part.iter(key)):
-                self.lost[key].append(name)
+                self.draft.lose(key, name)
         pair = Pair(name, TYPES[kind], (ends[0], ends[1]), self.frame(where).place)
         if pair.type not in ("spherical", "fixed"):
             pair.axis = self._axis(part, "axis", where, prefix)
@@ -255,12 +247,12 @@ def _pose(pose: Element | None, name: str) -> Frame:
 # Out
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the mechanism as SDF: links with the global axes, each with its origin at the joint that carries it.
 
     Cylindrical and planar pairs, which SDF lacks, are rows of joints with bodies of 1e-9 kg between.
     """
-    draft = opening(positions, options.row)
+    draft = opening(positions)
     root = Element("sdf", version="1.10")
     world = SubElement(root, "world", name="default")
     _leaf(world, "gravity", np.zeros(3) if draft.gravity is None else draft.gravity)

@@ -17,22 +17,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, counted
+from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.brep import Face, Moments, Solid
 from trunnion.exchange.draft import Array, Body, Draft, free_name
-from trunnion.exchange.formats import MATERIALS
-from trunnion.exchange.mating import joined, loose_contacts
+from trunnion.exchange.formats import MATERIALS, ImportOptions
+from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.part21 import Part21, quoted
 from trunnion.exchange.step_assembly import Assembly, Occurrence, Place
 
 if TYPE_CHECKING:
-    from trunnion.exchange.formats import ExportOptions, ImportOptions
     from trunnion.exchange.skeleton import Positions
 
-__all__ = ["read", "write"]
+__all__ = ["read", "write", "write_moved"]
 
-MOVES_PARTS = True  # of the file that a model came from
 MAGNIFIES = True
 PATIENCE = 60.0  # s, for the mesh of a free-form solid
 DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and angle, rad
@@ -88,9 +86,7 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
             names = [str(file[solid.number][file.kind(solid.number)][0] or "") for _, solid, _ in solids]
             names = [label if text in ("", "NONE") else text for text in names]
             what = f"is the only part, with {len(solids)} solids: each is taken as a link"
-            draft.warn(
-                "exchange.solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids)
-            )
+            draft.warn("exchange.solids", f"links.{label}", what, "export an assembly", count=len(solids))
             groups = [(text, [entry]) for text, entry in zip(names, solids, strict=True)]
         else:
             groups = [(label, solids)] if solids else []
@@ -103,7 +99,7 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
                 for face in _placed(solid.faces, place)
             ]
             if len(entries) > 1:
-                _rigid(draft, body.name, link, entries, options)
+                _rigid(draft, body.name, link, entries)
     if not draft.bodies:
         meshes = file.of("TESSELLATED_SOLID") or file.of("SHELL_BASED_SURFACE_MODEL")
         what = "has surfaces or meshes, but no solids" if meshes else "has no solids"
@@ -131,34 +127,19 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
         solids_here, surfaces = assembly.solids(leaf.definition)
         solids += [(leaf, solid, leaf.place @ place) for solid, place in solids_here]
         if surfaces or not (solids_here or leaf.children):
-            what = f"has {counted(surfaces, 'surface body', 'surface bodies')} or meshes, which are left out"
-            what = what if surfaces else "has no solid and is left out"
-            draft.warn("exchange.surfaces", f"links.{leaf.name or 'part'}", what, "export it as a solid")
+            draft.lose("surfaces and meshes" if surfaces else "parts without a solid", leaf.name or "part")
     return solids
 
 
-def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry], options: ImportOptions) -> None:
+def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry]) -> None:
     """Say that several solids are taken as one rigid link."""
     kind = "sub-assembly" if link.children else "part"
-    inside = {str(n): _placed(solid.faces, place) for n, (_, solid, place) in enumerate(entries)}
-    count = loose_contacts(inside, options.gap)
     what = f"is a {kind} of {len(entries)} solids, taken as one rigid link"
-    if count:
-        what += f"; {counted(count, 'pin')} in it {'has' if count == 1 else 'have'} play"
     remedy = "export it dissolved, its parts right below the top, if they move"
-    if count or not link.children:
-        draft.warn("exchange.rigid", f"links.{name}", what, remedy)
-    else:
-        draft.note("exchange.rigid", f"links.{name}", what, remedy)
+    draft.warn("exchange.rigid", f"links.{name}", what, remedy)
 
 
-def _body(
-    assembly: Assembly,
-    name: str,
-    entries: Sequence[Entry],
-    options: ImportOptions,
-    draft: Draft,
-) -> Body:
+def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: ImportOptions, draft: Draft) -> Body:
     """A link of solids: mass, centre and inertia in the global frame."""
     total = Moments()
     body = Body(name)
@@ -327,17 +308,15 @@ def _numbers(items: Sequence[int]) -> str:
     return ",".join(f"#{item}" for item in items)
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
-    """Write the skeleton of a mechanism at a position, or the parts of the file it came from moved there."""
-    if options.original is not None:
-        return _write_moved(positions, path, options)
-    draft = positions.draft(options.row)
+def write(positions: Positions, path: Path) -> list[Finding]:
+    """Write the skeleton of a mechanism at a position: points, axes and lines of its links."""
+    draft = positions.draft()
     text = _Text()
     context = text.context()
     size = float(np.ptp([pair.at for pair in draft.pairs.values()], axis=0).max()) or 1.0
     parts = []
     for name, body in draft.bodies.items():
-        place = Place(positions.rotations[name][options.row], positions.origins[name][options.row])
+        place = Place(positions.rotations[name][0], positions.origins[name][0])
         origin = text.placement(Place())
         drawn = text.placement(place)
         items = [origin, *_wires(text, draft, body, place.inverse, size)]
@@ -352,9 +331,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         relation = text(_relation(representation, root[1], moved))
         text(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
     path.write_text(text.text(), encoding="ascii")
-    draft.note(
-        "exchange.skeleton", "", "points, axes and lines are written; a STEP file has no masses, joints or friction"
-    )
+    draft.note("exchange.skeleton", "", "points, axes and lines are written, without masses, joints and friction")
     return draft.findings
 
 
@@ -387,12 +364,8 @@ def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) ->
     return [text(f"GEOMETRIC_CURVE_SET({quoted(body.name)},({_numbers(points + curves)}))")]
 
 
-def _write_moved(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
-    """The file that a model was imported from, with the parts of its links where they are at a position."""
-    from trunnion.exchange.formats import ImportOptions
-
-    original = options.original
-    assert original is not None
+def write_moved(positions: Positions, path: Path, original: Path) -> list[Finding]:
+    """Write the file that a model was imported from, with the parts of its links where they are at a position."""
     draft, assembly, parts = _opened(original, ImportOptions(ground=positions.mechanism.fixed_link))
     file = assembly.file
     turn = _model_frame(positions, draft)
@@ -405,9 +378,9 @@ def _write_moved(positions: Positions, path: Path, options: ExportOptions) -> li
             what = f"is a part of {original.name!r} and no link of the model"
             remedy = "--from takes what the usual --gap and --unit read; import it with these"
             raise MechanismError(Finding(what, f"links.{name}", remedy))
-        rotation, origin = positions.rotations[link][options.row], positions.origins[link][options.row]
+        rotation, origin = positions.rotations[link][0], positions.origins[link][0]
         if not np.isfinite(rotation).all():
-            what = f"has no solution at {positions.drive(options.row)}"
+            what = f"has no solution at {positions.drive(0)}"
             raise MechanismError(Finding(what, "--at", "choose another position; `trunnion analyse` says why"))
         move = Place(turn.T @ rotation @ turn, turn.T @ origin)
         if part.relation:

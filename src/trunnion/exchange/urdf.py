@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.exchange.draft import Array, Body, Draft, Pair
-from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import APART, WORLD, laid_out, opening, parsed, refused, text_of, written
 from trunnion.exchange.sdf import Reader, add_driver, add_joint, end_of
 from trunnion.exchange.skeleton import Positions
@@ -121,12 +121,12 @@ def _frames(draft: Draft, closes: bool) -> None:
                 draft.warn("exchange.loop", f"joints.{name}", what, "if it is a pin, make it revolute about an axis")
 
 
-def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+def write(positions: Positions, path: Path) -> list[Finding]:
     """Write the mechanism as URDF: a tree of links with the global axes; Gazebo's joints close its loops.
 
     Pairs that URDF lacks are rows of joints with links without mass between.
     """
-    draft = opening(positions, options.row, "gravity")
+    draft = opening(positions, "gravity")
     root, gazebo = Element("robot", name=draft.name or "mechanism"), Element("gazebo")
     origins, inner, closing, rates = laid_out(draft, ("cylindrical", "helical", "universal", "spherical"))
     for name, origin in origins.items():

@@ -240,7 +240,9 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
         entry = mechanism.measures.get(name)
         if entry is None:
             entry = _read(name)
-            findings += [] if entry is None else list(check_measure(mechanism, entry, f"--measure {name}"))
+            if entry is not None:
+                at = f"--measure {name}"  # its keys, such as `point`, are not written there
+                findings += [replace(finding, where=at) for finding in check_measure(mechanism, entry, at)]
         if entry is None:
             findings.append(Finding(f"'{name}' is no measure", "", _meant(name, mechanism), code="input.measure"))
         elif entry.kind == "efficiency" and not has_useful_work(mechanism):

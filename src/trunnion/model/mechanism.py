@@ -174,8 +174,8 @@ class Mechanism(Numbers):
         """The mechanism with other tolerances: half widths by name, each about the middle of its limits.
 
         A half width is in SI, or a text such as ±0.02 mm. The clearance of a joint, `joints.B.clearance`, is replaced
-        itself. Limits that stand with the number, `40 mm ± 0.02 mm`, are changed there. digits: how many significant
-        ones a half width is rounded down to. MechanismError for what is no half width.
+        itself. Limits that stand with the number, `40 mm ± 0.02 mm`, move to `tolerances`. digits: how many
+        significant ones a half width is rounded down to. MechanismError for what is no half width.
         """
         return Mechanism(**with_tolerances(self, half_widths, digits))
 

@@ -29,7 +29,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import joined, number, readable
 from trunnion.rig.judge import Verdict, judge, probability
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
-from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, load_joints, pairs_of
+from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, pairs_of
 from trunnion.rig.reading.timebase import gathered
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
@@ -57,14 +57,10 @@ CC, C = ("channel", "condition"), ("condition",)
 COURSE = (*CC, "position")
 EXPLAINED = "share of the mean square of the residual that it explains"
 VARIABLES: dict[str, Variable] = {
-    "value": Variable(
-        ("set", "condition"), "set", "number of the model that was set in the condition; NaN if it was not"
-    ),
+    "value": Variable(("set", "condition"), "set", "number of the model that the condition sets; NaN if it does not"),
     "phase": Variable(("condition", "position"), "1", "share of the cycle from its start"),
     "drive": Variable(("condition", "position"), "drive", "coordinate of the first driver, or time"),
-    "status": Variable(
-        ("condition", "position"), "1", "code of the model's status; see the attribute flag_meanings", np.int8
-    ),
+    "status": Variable(("condition", "position"), "1", "code of the model's status; see flag_meanings", np.int8),
     "measured": Variable(COURSE, "", "mean over the turns"),
     "scatter": Variable(COURSE, "", "standard deviation between turns"),
     "uncertainty": Variable(COURSE, "", "standard uncertainty of the mean: scatter, zero, gain"),
@@ -90,9 +86,7 @@ VARIABLES: dict[str, Variable] = {
     "efficiency": Variable(C, "1", "measured efficiency"),
     "efficiency_expanded": Variable(C, "1", "expanded uncertainty of the measured efficiency"),
     "efficiency_model": Variable(C, "1", "efficiency of the model"),
-    "efficiency_within": Variable(
-        C, "1", "1 where the model's efficiency is within ±U, −1 where one is unknown", np.int8
-    ),
+    "efficiency_within": Variable(C, "1", "1 if the model's efficiency is within ±U, −1 if one is unknown", np.int8),
 }
 
 
@@ -148,9 +142,7 @@ def _measures(measurement: Measurement, channels: Sequence[str] | None) -> dict[
     for condition in measurement.conditions:
         every = {name: signal.measures for name, signal in condition.courses.items() if signal.measures} | every
     if missing := [name for name in channels or () if name not in every]:
-        raise MechanismError(
-            [Finding(f"there is no channel '{name}'", "--channel", nearest(name, every)) for name in missing]
-        )
+        raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "--channel", nearest(missing[0], every)))
     if not every:
         what = "no channel measures anything of the model" if measurement.conditions else "there is no condition in it"
         remedy = "state measures: effort:DRIVER of a channel in the mapping"
@@ -180,19 +172,20 @@ def _compared(
     mechanism: Mechanism, condition: Condition, measures: Mapping[str, str], coverage: float, method: FrictionMethod
 ) -> ConditionComparison:
     measured = {name: what for name, what in measures.items() if name in condition.courses}
-    joints = load_joints(mechanism)
+    joints = {name: load.joint for name, load in mechanism.loads.items() if load.joint is not None}
     powers = pairs_of(condition, joints)
-    pairs = (*powers.driven, *powers.loaded) if powers else ()
-    of_powers = {signal.channel: signal.measures for pair in pairs for signal in pair}
+    of_powers = {signal.channel: signal.measures for side in powers or () for pair in side for signal in pair}
     model = modelled(mechanism, condition, measured, method, of_powers)
     without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
     figures: dict[str, dict[str, Any]] = {"": {"phase": condition.phase, "drive": model.drive, "status": model.status}}
     signals = {name: replace(condition.courses[name], local=model.left_open.get(name, 0.0)) for name in measured}
+    drive = model.drive if model.unit == "rad" and len(model.drive) > 1 else None
     for name, signal in signals.items():
         course, comparable = model.courses[name], model.comparable(name)
-        figures[name] = judge(signal, course, comparable, model.drive, coverage)
+        slope = np.gradient(course) / np.gradient(model.drive) if drive is not None else np.zeros_like(course)
+        angle = np.nan_to_num(np.hypot(condition.lag * condition.speed, condition.cut) * slope)
+        figures[name] = judge(signal, course, comparable, model.drive, coverage, angle)
         if figures[name]["verdict"] in (Verdict.NOT, Verdict.OFFSET):
-            drive = model.drive if model.unit == "rad" else None
             free = None if model.measures[name].of_motion else without_friction().get(name)
             gap = np.where(comparable, figures[name]["residual"], np.nan)
             for kind, (size, share) in causes(gap, course, signal.accuracy.datum, drive, free).items():
@@ -230,7 +223,7 @@ def causes(
     that goes away with it.
     """
     shapes = {"zero": np.ones_like(model), "gain": model - datum}
-    if drive is not None and len(drive) > 1:
+    if drive is not None:
         shapes["angle"] = np.gradient(model) / np.gradient(drive)
     if frictionless is not None:
         shapes["friction"] = model - frictionless
@@ -418,23 +411,18 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
     if off := [*by_verdict.get(Verdict.NOT, []), *by_verdict.get(Verdict.OFFSET, [])]:
         rms = max(row.figures[name]["rms"] for row in off)
         within = 100 * min(row.figures[name]["within"] for row in off)
-        display_unit, size = off[0].signals[name].shown
-        rms_text = (
-            joined(number(rms / size, 3), display_unit)
-            if display_unit not in ("rad", "1")
-            else readable(rms, display_unit, 3)
-        )
+        unit, size = off[0].signals[name].shown
+        rms_text = readable(rms, unit, 3) if unit in ("rad", "1") else joined(number(rms / size, 3), unit)
         offset = " apart from a constant offset" * (Verdict.NOT not in by_verdict)
         what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
         what += f"agree, and the RMS of the residual is {rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
         yield Finding.error("compare.not_within", where, what, remedy, within_percent=within, rms=rms)
-    remedy = "measure more turns, or see the gaps reported by `trunnion data`"
-    if unknown := by_verdict.get(Verdict.UNKNOWN):
-        what = f"has no position with values from two turns, so that U is not known, {_in_which(unknown, rows)}"
-        yield Finding.warning("compare.turns_few", where, what, remedy)
-    if nothing := by_verdict.get(Verdict.NOTHING):
-        what = f"not compared, for lack of measured values or of a solution of the model, {_in_which(nothing, rows)}"
+    if unknown := [*by_verdict.get(Verdict.UNKNOWN, []), *by_verdict.get(Verdict.NOTHING, [])]:
+        what = (
+            f"not compared, for lack of values from two turns or of a solution of the model, {_in_which(unknown, rows)}"
+        )
+        remedy = "measure more turns, or see the gaps reported by `trunnion data`"
         yield Finding.warning("compare.nothing", where, what, remedy)
 
 

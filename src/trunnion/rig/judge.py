@@ -41,8 +41,8 @@ class Uncertainty:
     """Standard uncertainty of a course, (position,), in its parts.
 
     random: of the mean over the turns; local: what else each position has by itself, such as the resolution; shared:
-    (part, position), of the zero and of the gain, each the same at all positions; turns: deviations of the turns from
-    their mean, (turn, position).
+    (part, position), of the zero, the gain and the angle, each the same at all positions; turns: deviations of the
+    turns from their mean, (turn, position).
     """
 
     random: Array
@@ -68,12 +68,12 @@ class Uncertainty:
         return Uncertainty(*(part[..., where] for part in vars(self).values()))
 
 
-def uncertainty_of(signal: Signal) -> Uncertainty:
-    """The parts of a signal's uncertainty."""
+def uncertainty_of(signal: Signal, angle: Array | float = 0.0) -> Uncertainty:
+    """The parts of a signal's uncertainty; angle: (position,), that by the angle of the drive."""
     zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
     random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
     local = np.hypot(np.full_like(random, signal.unresolved), signal.local)
-    shared = np.array([zero, signal.accuracy.gain * signal.read])
+    shared = np.array([zero, signal.accuracy.gain * signal.read, np.broadcast_to(angle, zero.shape)])
     return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
 
 
@@ -88,7 +88,12 @@ def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
 
 
 def judge(
-    signal: Signal, model: Array, comparable: NDArray[np.bool_], drive: Array, coverage: float = 2.0
+    signal: Signal,
+    model: Array,
+    comparable: NDArray[np.bool_],
+    drive: Array,
+    coverage: float = 2.0,
+    angle: Array | float = 0.0,
 ) -> dict[str, Any]:
     """Compare a signal with the model at the positions where that can be done.
 
@@ -99,13 +104,14 @@ def judge(
     comparable : (position,), where the model has one number.
     drive : (position,), coordinate of the driver.
     coverage : factor k of U = k u where turns are many.
+    angle : (position,), standard uncertainty by the angle of the drive.
 
     Returns
     -------
     Courses, figures of the residual and verdict, by the name of the variable of a comparison; no figures where nothing
     can be compared.
     """
-    where, every = comparable & np.isfinite(signal.mean) & np.isfinite(model), uncertainty_of(signal)
+    where, every = comparable & np.isfinite(signal.mean) & np.isfinite(model), uncertainty_of(signal, angle)
     courses: dict[str, Any] = {
         "measured": signal.mean, "scatter": signal.scatter, "uncertainty": every.total,
         "expanded": expanded(every.total, every.freedom, coverage), "model": model,

@@ -237,10 +237,12 @@ def instant_centres(walk: Forward, count: int, most: int) -> list[Centre]:
         between = plane.minus(two.twist, first.twist)
         # velocity of the second against the first at the second's origin; the centre lies across it
         speeds = plane.velocity_at(between, two.frame[:2])
-        numbers = (-between.y / between.w, between.x / between.w, *speeds, between.w, walk.size, walk.pace)
-        x, y, vx, vy, turn, size, pace = (
+        numbers = (between.x, between.y, between.w, *speeds, walk.size, walk.pace)
+        along, across, turn, vx, vy, size, pace = (
             np.broadcast_to(np.asarray(primal(part), float), (count,)) for part in numbers
         )
+        with np.errstate(all="ignore"):  # a link that only slides has its centre at infinity
+            x, y = -across / turn, along / turn
         speed = np.hypot(vx, vy)
         still = (np.abs(turn) <= AT_REST * pace) & (speed <= AT_REST * pace * size)
         away = ~(np.hypot(x, y) <= FAR * size) & (speed > AT_REST * pace * size)

@@ -415,7 +415,6 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "places": [[_kind_of_place(played, i), played.place(i)] for i in range(len(units))],
         **scales_of(run).summary(_summary(played, units)),
         "findings": finding_rows(findings),
-        "missed": [f"{finding.where}: {finding.what}" for finding in findings if finding.code == "limit.exceeded"],
     }
     variables = described(arrays, VARIABLES, {"measure": plain_units, "sensitivity": per_length})
     return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))

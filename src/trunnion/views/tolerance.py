@@ -425,8 +425,7 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tol
         count = int(result["samples"].values) if "samples" in result else int(result.attrs.get("samples", 0))
         facts += [*counts((count, "sample")), (f"seed {result.attrs.get('seed', '')}", "")]
     facts.append(("", ", ".join(method.replace("-", " ") for method in methods)))
-    lines = set(attribute(result, "missed"))  # what is wrong stands first, once, with its remedy
-    missed = [row for row in attribute(result, "findings") if f"{row['where']}: {row['what']}".lstrip(": ") in lines]
+    missed = [row for row in attribute(result, "findings") if row["severity"] == "error"]  # they stand first
     reads = readings(result)
     yields = _overall(result, reads)
     about = f"All limits together: yield {share_interval(*yields)}" if yields else ""

@@ -45,7 +45,7 @@ def check_model(mechanism: Numbers) -> list[Finding]:
 
 
 def _references(mechanism: Numbers) -> Iterator[Finding]:
-    """Whether there are links and joints, in the space that is stated, and what names refer to is there."""
+    """Whether the space is the one that is stated, and what names refer to is there."""
     sizes = [len(place.at) for link in mechanism.links.values() for place in link.points.values()]
     if "space" not in mechanism.model_fields_set and (mechanism.loop or sizes.count(3) > len(sizes) / 2):
         what = "this is a spatial model: it has a loop, or points with three coordinates"
@@ -53,10 +53,6 @@ def _references(mechanism: Numbers) -> Iterator[Finding]:
         return
     yield from loop(mechanism)
     yield from key_findings(mechanism)
-    if not mechanism.links and not mechanism.loop:
-        yield Finding("there are no links", "links", "state at least a ground and a moving link")
-    elif not mechanism.effective_joints:
-        yield Finding("there are no joints", "joints", "join the links")
     for name in mechanism.drivers:
         if name not in mechanism.effective_joints:
             remedy = nearest(name, mechanism.effective_joints)
@@ -79,6 +75,10 @@ def _references(mechanism: Numbers) -> Iterator[Finding]:
 
 def _together(mechanism: Numbers) -> Iterator[Finding]:
     """Whether the parts go together, each by itself and in its place, and the units of every expression."""
+    if not mechanism.links and not mechanism.loop:
+        yield Finding("there are no links", "links", "state at least a ground and a moving link")
+    elif not mechanism.effective_joints:
+        yield Finding("there are no joints", "joints", "join the links")
     yield from _quantities(mechanism)
     yield from _links(mechanism)
     yield from joint_findings(mechanism)

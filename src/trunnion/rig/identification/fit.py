@@ -9,8 +9,8 @@ within a turn neighbours may be correlated as they like.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from typing import NamedTuple
@@ -24,12 +24,11 @@ from trunnion.errors import Status
 from trunnion.rig.identification.signals import Courses, Model
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, rms
 
-__all__ = ["EFFICIENCY", "FAR", "FILE_ZERO", "Block", "Fit", "SensorError", "Solution", "corners", "refined",
+__all__ = ["FAR", "FILE_ZERO", "Block", "Fit", "SensorError", "Solution", "corners", "refined",
            "sensor_errors", "shared_zero", "sizes_of", "solved"]  # fmt: skip
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
 FILE_ZERO, FILE_ANGLE = "zero of each file", "angle of each condition"  # the latter by the sampling of pulses
 ROUNDING = 1e-9  # of a course, by interpolation and sums
 FAR_ABOVE = 100.0  # times the rounding: scatter beside which it is nothing
@@ -49,15 +48,13 @@ EFFECT = 0.1  # of a course: what an unknown whose own size says nothing is to c
 class Block:
     """One channel in one condition.
 
-    condition: its index; signal, held: with the turns to fit, and with those held out; effects: of a course that is
-    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error.
+    condition: its index; signal, held: with the turns to fit, and with those held out.
     """
 
     condition: int
     channel: str
     signal: Signal
     held: Signal
-    effects: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def data(self) -> Array:
@@ -108,8 +105,8 @@ class SensorError:
     """One error of a sensor, "zero" or "gain", or of the crank angle, "angle".
 
     channel: empty of the angle; sizes: its standard uncertainty in each block, in the unit of the course, relative, or
-    in shares of the cycle; 0 in blocks of other sensors; of a course that is computed, what it does to that, with its
-    sign. group: of one of many, what they are together; most: what it may come to, in its standard uncertainties;
+    in shares of the cycle; 0 in blocks of other sensors. group: of one of many, what they are together; most:
+    what it may come to, in its standard uncertainties;
     angle: of an error of the crank angle that has one size in all conditions, that, rad; stated: whether anything is
     known of it; one that is not is free.
     """
@@ -148,17 +145,14 @@ def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequenc
         condition, accuracy, channel = conditions[block.condition], block.signal.accuracy, block.channel
         add(k, float(np.hypot(shared_zero(accuracy), accuracy.cut)), f"zero of {channel}", channel, "zero")
         add(k, accuracy.gain, f"gain of {channel}", channel, "gain")
-        for name, size in {f"{FILE_ZERO} of {channel}": accuracy.own, **block.effects}.items():
-            group = name if name.startswith(FILE_ZERO) else ""
-            label = f"{name}: {' '.join(condition.files or (str(block.condition),))}" if group else name
-            add(k, size, label, name.partition(" of ")[2].removeprefix("each file of "), name.partition(" ")[0], group)
+        group, file = f"{FILE_ZERO} of {channel}", " ".join(condition.files or (str(block.condition),))
+        add(k, accuracy.own, f"{group}: {file}", channel, "zero", group)
         duration, _, turn = model.cycles[block.condition]
-        if block.signal.turns.shape[1] > 2:
-            add(k, condition.lag / (duration or inf), f"{FILE_ANGLE}: {condition.name}", "", "angle", FILE_ANGLE)
-            if condition.cut and np.isfinite(turn):  # may be anything up to half a step
-                size = abs(condition.cut)
-                name = f"angle in steps of {np.degrees(size * 12**0.5):.4g} deg"
-                add(k, condition.cut / turn, name, "", "angle", "", 3**0.5, size)
+        add(k, condition.lag / (duration or inf), f"{FILE_ANGLE}: {condition.name}", "", "angle", FILE_ANGLE)
+        if condition.cut and np.isfinite(turn):  # may be anything up to half a step
+            size = abs(condition.cut)
+            name = f"angle in steps of {np.degrees(size * 12**0.5):.4g} deg"
+            add(k, condition.cut / turn, name, "", "angle", "", 3**0.5, size)
     for name, error in errors.items():
         if np.isinf(error.sizes).any():
             every = [np.ravel(block.signal.turns) for block in blocks if block.channel == error.channel]
@@ -245,11 +239,9 @@ class Fit:
     def reading(self, x: Array, k: int) -> tuple[Array, Array]:
         """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        modelled, size = self.courses(x).said[block.condition][block.channel], block.signal.turns.shape[1]
-        value, slope, datum = modelled.value[:size], modelled.slope[:, :size], block.signal.accuracy.datum
-        # the errors behind a course that is computed are added to it
-        acting = [(s, "zero" if block.effects else error.kind, error.sizes[k])
-                  for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]  # fmt: skip
+        modelled, datum = self.courses(x).said[block.condition][block.channel], block.signal.accuracy.datum
+        value, slope = modelled.value, modelled.slope
+        acting = [(s, error.kind, error.sizes[k]) for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]
         zero, gain, angle = (
             float(sum(size * x[s] for s, kind, size in acting if kind == of)) for of in ("zero", "gain", "angle")
         )
@@ -257,7 +249,7 @@ class Fit:
         if angle:
             slope = slope - angle * self.model.by_share(block.condition, slope)
             value = value - angle * by_share
-        columns = np.zeros((len(x), size))
+        columns = np.zeros((len(x), len(value)))
         columns[: self.count] = (1 + gain) * slope
         shapes = {"zero": 1.0, "gain": value - datum, "angle": -(1 + gain) * by_share}
         for s, kind, error in acting:
@@ -294,13 +286,11 @@ class Fit:
         masks, courses = [], self.courses(x)
         for k, block in enumerate(self.blocks):
             status, turned = courses.status[block.condition], courses.turned[block.condition]
-            value, size = courses.said[block.condition][block.channel].value, block.signal.turns.shape[1]
-            if size == 1 < len(status):  # a figure of the cycle
-                good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
-            elif self.model.measures[block.channel].of_motion:  # whatever forces do
+            value = courses.said[block.condition][block.channel].value
+            if self.model.measures[block.channel].of_motion:  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
-                guard = -(-size // PER_GUARD) if self.guard is None else self.guard
+                guard = -(-len(value) // PER_GUARD) if self.guard is None else self.guard
                 u = np.sqrt(self.variances[k] / np.maximum(block.signal.count, 1) + block.unresolved**2)
                 phase, bends = self.model.phases[block.condition], self.model.bends[block.condition]
                 closed = self.model.run.cycle.periodic
@@ -308,7 +298,7 @@ class Fit:
                 for _ in range(guard - 1):
                     edges = edges | np.roll(edges, 1) | np.roll(edges, -1)
                 good = (status == Status.SOLVED) & ~(edges & (guard > 0))
-            masks.append(good & np.isfinite(block.data) & np.isfinite(value[:size]))
+            masks.append(good & np.isfinite(block.data) & np.isfinite(value))
         return masks
 
     def first_scatter(self) -> list[float]:

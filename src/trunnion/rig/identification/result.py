@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from copy import deepcopy
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import inputs, references
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.quantity import Quantity
-from trunnion.results.attributes import attribute, finding_rows, findings_of, origin
+from trunnion.results.attributes import attribute, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals, with_uncertainty
 from trunnion.rig.comparison import data_findings, hashed_files, other_speed, written_unit
 from trunnion.rig.identification.fit import FAR, Fit, Solution, shared_zero, sizes_of, solved
 from trunnion.rig.identification.signals import DriveCycle
-from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, Inseparable, quantile
-from trunnion.rig.reading.mapping import DataMapping
+from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, lack_of_fit, quantile
 from trunnion.rig.reading.measurement import Measurement, rms
-from trunnion.rig.reading.units import Amount
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Identified", "MisfitCause", "corrected_mapping", "dataset", "with_estimates"]
+__all__ = ["VARIABLES", "Identified", "dataset", "with_estimates"]
 
 Array = NDArray[np.float64]
 SOURCES = (
@@ -40,6 +36,7 @@ NEAR_LIMIT = 0.98  # of the most that a stated error may come to
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
 MUCH = 3.0  # times what scatter explains, between conditions
 POOR = 2.0  # times what is expected, of predictions
+UNEXPLAINED = 0.2  # of a misfit: what is left if an error explains it
 OFF = 3.0  # standard uncertainties from what was stated of a sensor
 
 PARAMETER, SENSOR, BLOCK = ("parameter",), ("sensor",), ("channel", "condition")
@@ -55,12 +52,10 @@ VARIABLES = {
     "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not, or if the interval is wider than the value itself"),
     "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
     "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
-    "singular_value": Variable(
-        PARAMETER, "1", "singular value of the derivatives with columns scaled to 1, the largest first"
-    ),
+    "singular_value": Variable(PARAMETER, "1", "singular value of the derivatives, columns scaled to 1; largest first"),
     "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
     "sensor_size": Variable(
-        SENSOR, "of the sensor", "its standard uncertainty as stated, of the angle rad; NaN if it differs"
+        SENSOR, "of the sensor", "stated standard uncertainty, of the angle rad; NaN if it differs"
     ),
     "sensor_uncertainty": Variable(SENSOR, "1", "standard uncertainty of that, in those stated"),
     "rms_before": Variable(BLOCK, "of the channel", "root mean square of the residual at the start"),
@@ -70,13 +65,9 @@ VARIABLES = {
     "left_out": Variable(BLOCK, "1", "positions with data that are not used", np.int32),
     "turns": Variable(BLOCK, "1", "turns used", np.int32),
     "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
-    "held_out_before": Variable(
-        BLOCK, "of the channel", "root mean square of the residual of the held-out data, at the start values"
-    ),
+    "held_out_before": Variable(BLOCK, "of the channel", "rms of the residual of the held-out data, at the start"),
     "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
-    "held_out_expected": Variable(
-        BLOCK, "of the channel", "its expected value from the scatter and the uncertainty of the prediction"
-    ),
+    "held_out_expected": Variable(BLOCK, "of the channel", "its expected value, by scatter and prediction"),
     "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
     "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
     "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
@@ -90,31 +81,12 @@ VARIABLES = {
 }
 
 
-class MisfitCause(NamedTuple):
-    """One explanation of a misfit.
-
-    kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
-    the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
-    leads to expect; times: its size in the standard uncertainties that are stated of it, 0 where none is; estimates,
-    halves: of the unknowns with it, and U of each, 95 %, (unknown,).
-    """
-
-    kind: str
-    channel: str
-    size: float
-    expanded: float
-    explains: float
-    times: float
-    estimates: Array
-    halves: Array
-
-
 @dataclass(frozen=True)
 class Identified:
     """An identification, with the figures of its unknowns and, behind them, of the errors of its sensors.
 
-    groups: what the data do not tell apart; causes: what would explain a misfit, best first; encoder: path of an
-    unknown by which the encoder of the data is off, no number of the mechanism; empty without.
+    groups: unknowns that the data do not separate, by their places; encoder: path of an unknown by which the encoder of
+    the data is off, no number of the mechanism; empty without.
     """
 
     mechanism: Mechanism
@@ -122,8 +94,7 @@ class Identified:
     fit: Fit
     solution: Solution
     spread: Covariances
-    groups: Sequence[Inseparable]
-    causes: Sequence[MisfitCause]
+    groups: Sequence[Sequence[int]]
     encoder: str = ""
 
     @property
@@ -134,7 +105,7 @@ class Identified:
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
         """What the data do not tell."""
-        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group.members])
+        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group])
 
     @cached_property
     def half(self) -> Array:
@@ -149,18 +120,24 @@ class Identified:
 
     @cached_property
     def beyond(self) -> dict[int, float]:
-        """What errors of sensors at their limit come to with nothing stated of them, by place; no stated one is so."""
-        fit, excess = self.fit, dict[int, float]()
+        """What errors of sensors come to with nothing stated of them, by place, where that is far off: of those at
+        their limit, and of those without which there is hardly a misfit."""
+        test, excess = self.spread.test, dict[int, float]()
+        fit = replace(self.fit, inflation=1.0) if test.misfit else self.fit
         for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
-            if error.stated and abs(size) > NEAR_LIMIT * error.most:
-                free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]
-                excess[s] = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
-        return {s: size for s, size in excess.items() if abs(size) >= FAR}
+            at_limit = abs(size) > NEAR_LIMIT * error.most
+            if error.stated and (at_limit or test.misfit):
+                free = replace(fit, sensors=[*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]])
+                x = solved(free, self.x).x
+                explained = at_limit or lack_of_fit(free, x).reduced - 1 < UNEXPLAINED * (test.reduced - 1)
+                if explained and abs(x[fit.count + s]) >= FAR:
+                    excess[s] = float(x[fit.count + s])
+        return excess
 
     @property
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.beyond) or any(cause.times > FAR for cause in self.causes[:1])
+        return self.spread.test.gross or bool(self.beyond)
 
     @cached_property
     def intervals(self) -> dict[str, NDArray[Any]]:
@@ -273,13 +250,10 @@ def dataset(identified: Identified) -> xr.Dataset:
         "hold_out_ratio": np.asarray(identified.hold_out_ratio),
     }
     labels = {
-        "parameter": names,
-        "parameter_2": names,
-        "source": list(spread.parts),
-        "sensor": [error.name for error in fit.sensors],
-        "channel": list(model.measures),
+        "parameter": names, "parameter_2": names, "source": list(spread.parts),
+        "sensor": [error.name for error in fit.sensors], "channel": list(model.measures),
         "condition": [condition.name for condition in conditions],
-    }
+    }  # fmt: skip
     ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in identified.cycles]
     attributes = {
         "name": mechanism.name,
@@ -337,26 +311,12 @@ def _fit(identified: Identified) -> Iterator[Finding]:
         reduced = f"{float(f'{test.reduced:.3g}'):,.10g}"  # without a power of ten
         what = f"the model does not fit: reduced χ² {reduced} (1 is expected from the scatter between turns), p-value "
         what += f"{max(test.chance, 1e-4):.2g}{' or less' * (test.chance < 1e-4)}; {worth}"
-        remedy = "see the residuals; identify another parameter as well, or use another friction law"
+        remedy = (
+            "`trunnion compare` shows what zero, gain, angle or friction would explain it; or identify more parameters"
+        )
         severity = Severity.ERROR if identified.refuted else Severity.WARNING
         figures = {"reduced": test.reduced, "chance": test.chance}
         yield Finding.weighed(severity, "fit.misfit", "fit", what, remedy, **figures)
-    if identified.causes:
-        first, stories = identified.causes[0], []
-        units = {block.channel: block.signal.unit for block in identified.fit.blocks} | {"": "rad"}
-        for kind, channel, size, expanded, explains, *_ in identified.causes:
-            by, unit = (100.0, "%") if kind == "gain" else (1.0, units[channel])
-            of = f"the {kind} of {channel or 'the drive'} off by {with_uncertainty(by * size, by * expanded, unit)}"
-            stories.append(f"{of} ({100 * explains:.1f} %)")
-        rows = [*zip(identified.fit.model.unknowns, first.estimates, first.halves, strict=True)]
-        estimates = [f"{number.name} = {with_uncertainty(value, half, number.unit)}" for number, value, half in rows]
-        yield Finding.warning(
-            "fit.cause", "fit",
-            f"what would explain the misfit: {' or '.join(stories)}; with the first {_joined(estimates)}",
-            "check sensor, unit and zero, and lengths and loads of the model, which may act alike",
-            kind=first.kind, channel=first.channel, size=first.size, expanded=first.expanded,
-            explains_percent=100 * first.explains, values={number.name: float(value) for number, value, _ in rows},
-        )  # fmt: skip
     if ratio > POOR:
         what = f"the held-out data differ from the prediction by {ratio:.1f} times its standard uncertainty"
         remedy = "the model lacks an effect that differs there"
@@ -366,7 +326,7 @@ def _fit(identified: Identified) -> Iterator[Finding]:
 def _repetitions(identified: Identified) -> Iterator[Finding]:
     """Whether turns and conditions repeat."""
     fit, spread = identified.fit, identified.spread
-    for p, unknown in enumerate(fit.model.unknowns) if not identified.causes else ():
+    for p, unknown in enumerate(fit.model.unknowns):
         times = float(np.sqrt(spread.apart[p]))
         if times > 1 and not identified.lost[p]:
             what = f"the conditions disagree: estimates from single ones vary {times:.2g} times as much as the "
@@ -390,13 +350,13 @@ def _sensors(identified: Identified) -> Iterator[Finding]:
     """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit."""
     fit, bare = identified.fit, dict[str, bool]()
     for block in (fit.blocks[k] for k in fit.fitted):
-        has_error = bool(block.effects or shared_zero(block.signal.accuracy) or block.signal.accuracy.gain)
+        has_error = bool(shared_zero(block.signal.accuracy) or block.signal.accuracy.gain)
         bare[block.channel] = bare.get(block.channel, True) and not has_error
     if names := [name for name, is_bare in bare.items() if is_bare and not fit.model.measures[name].of_motion]:
         what = f"no accuracy is stated for {_joined(names)}: zero and gain count as exact, and the intervals are too "
         remedy = "state accuracy: {zero: …, gain: …} in the mapping"
         yield Finding.warning("sensor.no_accuracy", "sensors", f"{what}narrow", remedy)
-    for s, sensor in enumerate(fit.sensors) if not (identified.causes or identified.spread.test.gross) else ():
+    for s, sensor in enumerate(fit.sensors) if not identified.spread.test.gross else ():
         excess, times = s in identified.beyond, abs(identified.beyond.get(s, float(identified.x[fit.count + s])))
         if sensor.stated and times > OFF:
             what = f"differs from its stated value by {times:.1f} standard uncertainties"
@@ -412,11 +372,10 @@ def _parameters(identified: Identified) -> Iterator[Finding]:
     channels = _joined(list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)))
     every = [*(unknown.name for unknown in fit.model.unknowns), *(f"the {error.name}" for error in fit.sensors)]
     for group in identified.groups:
-        names = [every[i] for i in group.members]
+        names = [every[i] for i in group]
         what = f"{names[0]} is not identifiable: it has no effect on {channels}"
         if len(names) > 1:
-            what = f"{_joined(names)} are not separately identifiable: they have the same effect on {channels}; "
-            what += group.determined
+            what = f"{_joined(names)} are not separately identifiable: they have the same effect on {channels}"
         remedy = "fix one or more, or measure a quantity that tells them"
         yield Finding.warning("parameter.not_told_apart", f"parameter {names[0]}", what, remedy, names=names)
     for p, unknown in enumerate(fit.model.unknowns) if not identified.refuted else ():
@@ -441,7 +400,7 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
     Returns
     -------
     The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is, and
-    so does the start of a driver: by that the encoder is off, see `corrected_mapping`.
+    so does the start of a driver: by that the encoder is off, and the zero of the angle in the mapping.
     """
     values: dict[str, float | str] = {}
     units = attribute(result, "parameter_units")
@@ -459,66 +418,3 @@ def _text(mechanism: Mechanism, path: str, value: float, u: float, si: str) -> f
     places = decimals(u / factor) if u > 0 else 6
     number = f"{round(value / factor, places):.{max(places, 0)}f}" if places < 12 else f"{value / factor:.6g}"
     return f"{number} {written}" if written else float(number)
-
-
-# ---- in the mapping --------------------------------------------------------------------------------------------
-
-
-def corrected_mapping(mapping: Mapping[str, Any], result: xr.Dataset) -> dict[str, Any]:
-    """Put into a mapping the zero of the angle or of a channel that a result says is off.
-
-    Parameters
-    ----------
-    mapping : entries of the mapping that was identified with.
-    result : of `identify`, with the start of the first driver among its parameters, or with one error of the angle or
-        of a zero that explains its misfit.
-
-    Returns
-    -------
-    The entries with other zeros: identification with them finds none off.
-
-    Raises
-    ------
-    MechanismError
-        Where the result finds no such error, or the zero of the channel is that of an unloaded stretch.
-    """
-    entries = deepcopy(dict(mapping))
-    path, paths = str(result.attrs["encoder"]), attribute(result, "parameter_paths")
-    p = next((p for p, place in enumerate(paths) if path in place and result["told"].values[p]), None)
-    causes = (finding.figures for finding in findings_of(result) if finding.code == "fit.cause")
-    cause: Mapping[str, Any] = next(causes, {"kind": ""})
-    if p is not None:
-        _turn(entries, float(result["estimate"].values[p]) - _model_start(result, path))
-    elif cause["kind"] == "angle":
-        _turn(entries, cause["size"])
-    elif cause["kind"] == "zero":
-        _shift(entries, cause["channel"], cause["size"])
-    else:
-        what = "no zero of the angle or of a channel explains a misfit: there is nothing to correct in the mapping"
-        raise MechanismError(Finding(what, "mapping", "identify drivers.NAME.start for the zero of the angle"))
-    return entries
-
-
-def _model_start(result: xr.Dataset, path: str) -> float:
-    """The coordinate of the first driver at the start of the cycle in the model, rad."""
-    return next((float(row["value"]) for row in attribute(result, "inputs") if row["path"] == path), 0.0)
-
-
-def _turn(entries: dict[str, Any], angle: float) -> None:
-    """Another zero of the angle, rad, and of the files that state their own."""
-    parts = [entries.get("angle"), *(file.get("angle") for file in entries.get("files", ()))]
-    for part in (part for part in parts if isinstance(part, dict)):
-        zero = float(Quantity.read(part.get("zero", 0)).evaluate()) + angle
-        part["zero"] = f"{np.degrees(zero):.4f} deg"
-
-
-def _shift(entries: dict[str, Any], name: str, size: float) -> None:
-    """Another zero of a channel that reads too much by a size, SI."""
-    channel, part = DataMapping.model_validate(entries).channels[name], entries["channels"][name]
-    scale = channel.scale(channel.unit or "")
-    has_zero = any("zero" in file.get("channels", {}).get(name, {}) for file in entries.get("files", ()))
-    if has_zero or not isinstance(channel.zero, Amount):
-        what = f"the zero of an unloaded stretch, or of single files, is off by {size:.4g} {scale.unit}"
-        raise MechanismError(Finding(what, f"channels.{name}.zero", "check what loads the sensor there"))
-    zero = scale.factor * scale.reading(channel.zero, "zero") + channel.sign * size
-    part["zero"] = f"{zero:.6g} {scale.unit}"

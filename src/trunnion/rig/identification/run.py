@@ -18,35 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measures.measures import Measure, named
+from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identification.fit import (
-    EFFICIENCY,
-    FILE_ZERO,
-    Block,
-    Evaluations,
-    Fit,
-    SensorError,
-    refined,
-    sensor_errors,
-    shared_zero,
-    solved,
-)
-from trunnion.rig.identification.result import Identified, MisfitCause, dataset
+from trunnion.rig.identification.fit import Block, Evaluations, Fit, refined, sensor_errors, solved
+from trunnion.rig.identification.result import Identified, dataset
 from trunnion.rig.identification.signals import Model, Parameters, described, unknowns
-from trunnion.rig.identification.uncertainty import inseparable, quantile, spread_of
-from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_unit, same_cycle
-from trunnion.rig.reading.measurement import (
-    Accuracy,
-    Condition,
-    Measurement,
-    Signal,
-    efficiency_of,
-    load_joints,
-    pairs_of,
-    rms,
-)
+from trunnion.rig.identification.uncertainty import inseparable, spread_of
+from trunnion.rig.modelled import each, in_condition, measure_of, refuse_unit, same_cycle
+from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
@@ -61,9 +41,6 @@ NOTHING = 1e-9  # of a course: what an unknown does to it
 MOST_NAMED = 6  # conditions in a message
 SAME = 1e-6  # of a setting
 HALVINGS = 8  # of a friction that locks at the start
-EXPLAINS = 0.8  # of a misfit, at least, for a cause of it to be named
-SETTLED = np.radians(0.01)
-ROUNDS = 5  # of the angle
 
 
 @strict_arguments
@@ -89,8 +66,7 @@ def identify(
     measurement : as `rig.read` or `rig.observe` has it.
     parameters : names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
         be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`.
-    channels : of the measurement; all that an unknown acts on if not given; `efficiency` is computed of torques and
-        speeds.
+    channels : of the measurement; all that an unknown acts on if not given.
     start : where the search begins, by name, SI or texts with units; the model's values if not given.
     hold_out : conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted
         but predicted.
@@ -117,7 +93,7 @@ def identify(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    blocks = _blocks(mechanism, measurement, channels, held_out(mechanism, measurement, hold_out))
+    blocks = _blocks(measurement, channels, held_out(mechanism, measurement, hold_out))
     if follow := [seat.joint for seat in run.seats if seat.given is None]:
         what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
         raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
@@ -147,18 +123,13 @@ def identify(
         fit = replace(fit, inflation=spread.excess)
         best = best._replace(x=solved(fit, best.x).x)
         spread = spread_of(fit, best.x)
-    cycles = [model.cycle(k, best.x[: fit.count]) for k in range(len(conditions))]
-    other_speed = any(apart(condition.speed, cycle.speed) for condition, cycle in zip(conditions, cycles, strict=True))
-    causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not other_speed else []
-    groups = inseparable(fit, best.x, spread)
-    return dataset(Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder))
+    return dataset(Identified(mechanism, measurement, fit, best, spread, inseparable(fit, best.x, spread), encoder))
 
 
 # ---- the data -------------------------------------------------------------------------------------------------
 
 
 def _blocks(
-    mechanism: Mechanism,
     measurement: Measurement,
     channels: Sequence[str] | None,
     held_conditions: tuple[frozenset[str], float],
@@ -167,21 +138,17 @@ def _blocks(
 
     held_conditions: conditions by name, and the share of the turns of each, the last ones.
     """
-    conditions, joints, (names, share) = measurement.conditions, load_joints(mechanism), held_conditions
+    conditions, (names, share) = measurement.conditions, held_conditions
     every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
     if not every:
         raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
-    computed = [EFFICIENCY] if any(pairs_of(condition, joints) for condition in conditions) else []
-    if missing := [name for name in channels or () if name not in (*every, *computed)]:
-        remedy = f"the measurement has {', '.join(every)}{f', and {EFFICIENCY} of them' if computed else ''}"
+    if missing := [name for name in channels or () if name not in every]:
+        remedy = f"the measurement has {', '.join(every)}"
         raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "channels", remedy))
     blocks = []
-    picked = every if channels is None else [name for name in dict.fromkeys([*every, *computed]) if name in channels]
+    picked = every if channels is None else [name for name in every if name in channels]
     for (index, condition), channel in product(enumerate(conditions), picked):
-        signal, effects = condition.courses.get(channel), dict[str, float]()
-        if signal is None and channel == EFFICIENCY and pairs_of(condition, joints):
-            signal, effects = _efficiency(condition, joints)
-        if signal is None:
+        if (signal := condition.courses.get(channel)) is None:
             continue
         turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
         fitted = len(turns) - (max(1, round(share * len(turns))) if share else 0)
@@ -191,23 +158,10 @@ def _blocks(
             raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
         fitted = 0 if condition.name in names else fitted
         first, last = (replace(signal, turns=part) for part in (turns[:fitted], turns[fitted:]))
-        blocks.append(Block(index, channel, first, last, effects))
+        blocks.append(Block(index, channel, first, last))
     if not any(len(block.signal.turns) for block in blocks):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return blocks
-
-
-def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Signal, dict[str, float]]:
-    """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
-    efficiency, effects = efficiency_of(condition, joints), dict[str, float]()
-    for term in efficiency.contributions:
-        accuracy = condition.courses[term.channel].accuracy if term.channel in condition.courses else Accuracy()
-        if term.source == "gain":
-            effects[f"gain of {term.channel}"] = term.sensitivity * term.input
-        elif term.source == "zero":
-            effects[f"zero of {term.channel}"] = term.sensitivity * shared_zero(accuracy)
-            effects[f"{FILE_ZERO} of {term.channel}"] = term.sensitivity * accuracy.own
-    return Signal(EFFICIENCY, "efficiency:cycle", "1", efficiency.per_turn[:, None]), effects
 
 
 def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) -> tuple[frozenset[str], float]:
@@ -285,8 +239,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
     measures: dict[str, Measure] = {}
     for block in blocks:
         channel, text = block.channel, block.signal.measures
-        of_turns = (channel, text, block.signal.turns.shape[1]) == (EFFICIENCY, "efficiency:cycle", 1)
-        measure = named(mechanism, [text], run.values)[0] if of_turns else measure_of(mechanism, run, channel, text)
+        measure = measure_of(mechanism, run, channel, text)
         refuse_unit(run, measure, channel, block.signal)
         if measures.setdefault(channel, measure).name != measure.name:
             what = f"measures {measures[channel].name} in one condition and {measure.name} in another"
@@ -327,46 +280,3 @@ def _runnable(fit: Fit) -> Array:
         remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
         raise MechanismError(Finding(what, "data", remedy))
     return best
-
-
-def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
-    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more.
-
-    A zero and a gain of each channel, and an offset of the angle; nothing is stated of them.
-    """
-    causes, channels = [], list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted))
-    for kind, channel in (*product(("zero", "gain"), channels), ("angle", "")):
-        own_blocks, unit = [block for block in fit.blocks if block.channel == channel], 0.01
-        sizes = np.array([unit * (block.channel == channel) for block in fit.blocks])
-        if kind == "zero":
-            usual = rms(np.concatenate([block.signal.turns.ravel() for block in own_blocks])) or 1.0
-            sizes, unit = sizes * usual, unit * usual
-        elif kind == "angle":
-            sizes = np.array([-unit / fit.model.cycles[block.condition].turn for block in fit.blocks])
-            sizes *= [block.signal.turns.shape[1] > 2 for block in fit.blocks]
-        if not (np.isfinite(sizes).all() and np.any(sizes)):
-            continue
-        error, size, begin, moved = SensorError(kind, channel, kind, sizes, stated=False), 0.0, start, fit
-        with suppress(ValueError):  # no answer of the model there
-            for _ in range(ROUNDS if kind == "angle" and fit.model.run.cycle.periodic else 1):
-                more, best = refined(
-                    replace(moved, sensors=[*fit.sensors, error], inflation=1.0), np.append(begin, 0.0)
-                )
-                begin, step, size = best.x[:-1], float(best.x[-1]) * unit, size + float(best.x[-1]) * unit
-                if abs(step) < SETTLED or abs(size) > np.pi:
-                    break
-                phases = zip(fit.model.phases, fit.model.cycles, strict=True)  # follow the angle until it is settled
-                shifted = tuple((phase + size / cycle.turn) % 1.0 for phase, cycle in phases)
-                moved = replace(fit, courses_at=Evaluations(replace(fit.model, phases=shifted)))
-            spread = spread_of(more, best.x)
-            half, share = quantile(spread.freedom) * spread.deviation, (reduced - spread.test.reduced) / (reduced - 1)
-            wide = float(half[-1]) * unit
-            much = abs(size) > np.pi if kind == "angle" else kind == "gain" and size < 2e-6 - 1  # nothing is left
-            if share >= EXPLAINS and abs(size) > wide and not much:
-                alike = [sensor for sensor in fit.sensors if (sensor.kind, sensor.channel) == (kind, channel)]
-                deviations = (sensor.angle if kind == "angle" else np.abs(sensor.sizes).max() for sensor in alike
-                            if sensor.stated)  # fmt: skip
-                largest = max(map(float, deviations), default=0.0)
-                times, n = abs(size) / largest if largest else 0.0, fit.count
-                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[:n], half[:n]))
-    return sorted(causes, key=lambda item: -round(item.explains, 2))  # of equal ones first the simplest

@@ -23,7 +23,7 @@ from trunnion.model.parameters import measured
 from trunnion.model.rules import Within
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward, posed
+from trunnion.solve.forward import posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.status import pose_status, status_of
@@ -136,25 +136,11 @@ class Model:
         with np.errstate(all="ignore"):
             if all(measure.of_motion for measure in self.measures.values()):
                 walk = posed(self.run.system, values, self.run.chosen.assembly, time)
-                courses = {name: self._course(measure, walk) for name, measure in self.measures.items()}
+                courses = {name: measure.curve(walk)[0] for name, measure in self.measures.items()}
                 return courses, pose_status(walk, shape), np.zeros(shape, bool)
             back = self.run.solve(time, values, self.friction)
-            courses = {name: self._course(measure, back) for name, measure in self.measures.items()}
+            courses = {name: measure.curve(back)[0] for name, measure in self.measures.items()}
             return courses, status_of(back, shape), self._turned(back, shape)
-
-    def _course(self, measure: Measure, solved: Backward | Forward) -> Number:
-        parts = measure.curve(solved)
-        return parts[0] if len(parts) == 1 else self._summed(parts[0]) / self._summed(parts[1])
-
-    def _summed(self, power: Number) -> Number:
-        """Work over the cycle but for a factor: sums over a period, trapezia over a range."""
-        if isinstance(power, Dual):
-            return Dual(self._summed(power.real), self._summed(power.dual))
-        if np.ndim(power) == 0:
-            return power
-        row = np.asarray(power, float)
-        total = np.mean(row, axis=-1) if self.run.cycle.periodic else np.trapezoid(row, axis=-1) / (row.shape[-1] - 1)
-        return np.asarray(total)[..., None]
 
     def _turned(self, back: Backward, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""

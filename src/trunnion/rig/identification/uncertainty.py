@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse.csgraph import connected_components
 
-from trunnion.results.quantities import with_uncertainty
 from trunnion.rig.identification.fit import Fit, sizes_of
 from trunnion.rig.reading.measurement import student
 from trunnion.rig.reading.turns import covariance_of_steps
 
-__all__ = ["CONFIDENCE", "Covariances", "Inseparable", "LackOfFit", "inseparable", "lack_of_fit", "quantile",
-           "spread_of"]  # fmt: skip
+__all__ = ["CONFIDENCE", "Covariances", "LackOfFit", "inseparable", "lack_of_fit", "quantile", "spread_of"]
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
@@ -35,7 +33,6 @@ GROSS = 9.0  # reduced χ² of residuals of three times the scatter
 WORTH = 1.05  # reduced χ² up to which it is not
 ENOUGH_PAIRS = 10  # of turns, to see whether they follow each other
 PART = 0.05  # of the largest share in a direction: what is below it takes no part
-SAME = 0.02  # of 1: how near a factor is to it to be called it
 SINGULAR = 1e-10  # of the largest eigenvalue of the scaled information: derivatives are exact to some 1e-12 of it
 
 
@@ -298,53 +295,12 @@ def _left_over(fit: Fit, x: Array, pulls: dict[int, Array], repeats: bool) -> tu
 # ---- what the data do not tell apart ---------------------------------------------------------------------------
 
 
-class Inseparable(NamedTuple):
-    """Unknowns (and sensors, by their place behind them) that the data do not tell apart; one has no effect on them.
-
-    determined: what they do tell of two, in words.
-    """
-
-    members: tuple[int, ...]
-    determined: str
-
-
-def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[Inseparable]:
-    """The groups of unknowns that take part in directions of which nothing is known, together if they share one."""
-    sizes, groups = sizes_of(fit, x), []
-    basis, _ = np.linalg.qr((spread.null / sizes).T)
+def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[tuple[int, ...]]:
+    """Places of unknowns and sensors that the data do not separate: groups that take part in directions of which
+    nothing is known, together if they share one."""
+    basis, _ = np.linalg.qr((spread.null / sizes_of(fit, x)).T)
     projector = basis @ basis.T
     share = np.diagonal(projector)
     takes = np.flatnonzero((share > PART**2 * np.max(share, initial=0.0)) & (share > 0))
-    _, labels = connected_components(np.abs(projector[np.ix_(takes, takes)]) > PART**2)
-    for label in range(labels.max(initial=-1) + 1):
-        index, determined = takes[labels == label], "none of them is known alone"
-        if len(index) == 2:  # the combination that does not change along the direction, unless it is vague too
-            direction, determined = projector[index, index[0]] * sizes[index], "no combination of them is identifiable"
-            factors = np.array([1.0, -direction[0] / direction[1]])
-            variance = float(factors @ spread.covariance[np.ix_(index, index)] @ factors)
-            half = float(quantile(spread.freedom[index[0]])) * float(np.sqrt(max(variance, 0.0)))
-            if half < float(np.abs(factors) @ sizes[index]):
-                determined = f"{_combination(fit, x, index, float(factors[1]), half)}, neither alone"
-        groups.append(Inseparable(tuple(int(item) for item in index), determined))
-    return groups
-
-
-def _combination(fit: Fit, x: Array, index: Array, factor: float, half: float) -> str:
-    """What two unknowns have in common that is known to ± half: their product or ratio, p q moves by q dp + p dq.
-
-    Two of one kind, such as the frictions of two joints, add.
-    """
-    (p, q), unknowns = x[index], fit.model.unknowns
-    units = [unknowns[i].unit if i < fit.count else "1" for i in index]
-    if max(index) < fit.count and p and q:
-        relative, kinds = factor * q / p, {unknowns[i].paths[0].rpartition(".")[2] for i in index}
-        if len(kinds) > 1 and abs(abs(relative) - 1) < SAME:
-            form, value = ("product", p * q) if relative > 0 else ("ratio", p / q)
-            dimensional = [unit for unit in units if unit not in ("", "1")]
-            unit = dimensional[0] if form == "product" and len(dimensional) == 1 else "1"
-            return f"their {form} is determined, {with_uncertainty(value, half * abs(value / p), unit)}"
-    factor = float(np.sign(factor)) if abs(abs(factor) - 1) < SAME else factor
-    names = [unknowns[i].name if i < fit.count else fit.sensors[i - fit.count].name for i in index]
-    weighed = f"{names[0]} {'−' if factor < 0 else '+'} {abs(factor):.3g} {names[1]} (SI)"
-    form = {1.0: "their sum", -1.0: "their difference"}.get(factor, weighed)
-    return f"{form} is determined, {with_uncertainty(float(p + factor * q), half, units[0] or '1')}"
+    count, labels = connected_components(np.abs(projector[np.ix_(takes, takes)]) > PART**2)
+    return [tuple(takes[labels == label].tolist()) for label in range(count)]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 from typing import NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import Channel, Filter
 from trunnion.rig.reading.tables import Column
@@ -252,23 +251,20 @@ def missing(where: str, column: Column, readings: Array, seconds: Array) -> Find
     example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
     what = lost(f"dropouts{example}", mask, seconds, "cell")
     remedy = "check sensor, cable and logger"
-    if re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", column.example):
-        sign = "," if "," in column.example else "."
-        remedy = f"'{sign}' may be decimal or stand between thousands: write these numbers without it, or with decimals"
     return warning("readings.missing", where, what, remedy) if mask.any() else None
 
 
 def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:
-    """Readings at the end of the range or beyond, which become NaN; an error where most of the channel is."""
+    """Readings at the end of the range or beyond, which become NaN; MechanismError where most of the channel is."""
     rows = np.abs(readings) >= CLIP * limit
-    count, finite = int(np.count_nonzero(rows)), int(np.count_nonzero(np.isfinite(readings)))
     what = lost(f"clipped at the end of the range of {limit:.6g} {unit} or beyond", rows, seconds)
-    if count > MOST * finite:  # what is left says nothing of the channel
-        remedy = "check column, unit, gain and range of the channel in the mapping; else use a larger range"
-        figures = {"count": count, "readings": finite}
-        raise MechanismError(Finding(what, where, remedy, code="data.readings.clipped", figures=figures))
+    remedy = "use a larger range or a smaller load, or correct column, unit, gain and range in the mapping"
+    finding = warning("readings.clipped", where, what, remedy)
+    figures = {"count": int(np.count_nonzero(rows)), "readings": int(np.count_nonzero(np.isfinite(readings)))}
+    if figures["count"] > MOST * figures["readings"]:  # the rest says nothing of the channel
+        raise MechanismError(replace(finding, severity=Severity.ERROR, figures=figures))
     readings[rows] = np.nan
-    return warning("readings.clipped", where, what, "use a larger range or a smaller load") if count else None
+    return finding if rows.any() else None
 
 
 def faults(
@@ -409,12 +405,13 @@ def signs(
             unit, size = sensors[rate].read_in if sensors[rate].read_in[0] else (sensors[rate].scale.unit, 1.0)
             what = f"the angle turns at {turning / size:.4g} {unit}, {ratio:.4g} times what '{rate}' reads"
             remedy = (
-                f"write sign: {-sensors[rate].channel.sign} or turn angle.sign, if that alone is wrong; else check "
+                f"write sign: {-sensors[rate].channel.sign}, or correct unit and gain, or sign and per_turn of angle"
             )
-            yield warning("rate.ratio", f"channels.{rate}", what, f"{remedy}unit and gain, and per_turn of angle")
-    pairs = [(name, rates.get(driver), "into") for driver, name in drivers.items() if abs(ratio + 1) > APART]
+            yield warning("rate.ratio", f"channels.{rate}", what, remedy)
     other = free[0] if len(free) == 1 else None
-    pairs += [(name, rates.get(load, other), "out at") for load, name in loads.items()]
+    pairs = [(name, rates.get(load, other), "out at") for load, name in loads.items()]
+    if abs(ratio + 1) > APART:  # else that explains it
+        pairs += [(name, rates.get(driver), "into") for driver, name in drivers.items()]
     for name, rate, side in pairs:
         if rate is None and (side == "out at" or len(drivers) > 1):
             continue

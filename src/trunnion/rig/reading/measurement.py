@@ -23,11 +23,10 @@ from trunnion.rig.reading.turns import LeftOfSteps
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.model.mechanism import Mechanism
 
 __all__ = [
-    "COVERAGE", "Accuracy", "Condition", "Efficiency", "Measurement", "Pairs", "Signal", "UncertaintyContribution",
-    "between_turns", "dataset", "efficiency_of", "load_joints", "pairs_of", "rms", "student",
+    "COVERAGE", "Accuracy", "Condition", "Efficiency", "Measurement", "Powers", "Signal", "UncertaintyContribution",
+    "between_turns", "dataset", "efficiency_of", "pairs_of", "rms", "student",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -309,24 +308,14 @@ class Efficiency:
         return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {self.factor():.2g})"
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """The courses whose products are powers: (torque or force, speed), of drivers and of loads."""
-
-    driven: tuple[tuple[Signal, Signal], ...]
-    loaded: tuple[tuple[Signal, Signal], ...]
+Powers = tuple[tuple[Signal, Signal], ...]  # torque or force with its speed
 
 
-def load_joints(mechanism: Mechanism) -> dict[str, str]:
-    """The joint that each load on a joint acts in, by name of the load."""
-    return {name: load.joint for name, load in mechanism.loads.items() if load.joint is not None}
-
-
-def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> Pairs | None:
+def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> tuple[Powers, Powers] | None:
     """The channels that tell power in and out: `effort:D` with `rate:D`, `load:L` with `rate:` of its joint.
 
-    joints: of the loads, see `load_joints`. Without it a load goes with the one measured speed that is no driver's, or
-    with the only one there is. None where a torque or its speed is missing.
+    joints: that the loads act in, by name of the load. Without it a load goes with the one measured speed that is no
+    driver's, or with the only one there is. None where a torque or its speed is missing.
     """
     subjects: dict[str, dict[str, Signal]] = {"effort": {}, "rate": {}, "load": {}}
     for course in condition.courses.values():
@@ -339,10 +328,8 @@ def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> P
     places = {name: (joints or {}).get(name, guessed) for name in loads}
     if not efforts or not loads or any(name not in rates for name in (*efforts, *places.values())):
         return None
-    return Pairs(
-        tuple((course, rates[name]) for name, course in efforts.items()),
-        tuple((course, rates[places[name]]) for name, course in loads.items()),
-    )
+    driven = tuple((course, rates[name]) for name, course in efforts.items())
+    return driven, tuple((course, rates[places[name]]) for name, course in loads.items())
 
 
 def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None) -> Efficiency:
@@ -365,14 +352,13 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
     MechanismError
         Where the channels do not tell both powers, no turn is whole, or no power goes in.
     """
-    pairs = pairs_of(condition, joints)
-    if pairs is None:
+    sides = pairs_of(condition, joints)
+    if sides is None:
         measured = ", ".join(f"{name} ({course.measures})" for name, course in condition.courses.items()) or "none"
         what = f"the channels do not measure input and output power; there are {measured}"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
-    dwell, timing = _dwell(pairs, condition)
-    sides = (pairs.driven, pairs.loaded)
+    dwell, timing = _dwell(sides[0], condition)
     powers = [np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0) for side in sides]
     (powers_in, powers_out), fillable = _filled(*powers)
     if not np.any(fillable):
@@ -380,7 +366,7 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
         raise MechanismError(Finding(what, condition.name, "see the gaps reported by `trunnion data`"))
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
     if not power_in:
-        names = " or ".join(course.channel for pair in pairs.driven for course in pair)
+        names = " or ".join(course.channel for pair in sides[0] for course in pair)
         what = f"there is no input power: {names} reads 0 throughout"
         raise MechanismError(Finding(what, condition.name, "check these channels: a sensor may have failed"))
     value = power_out / power_in
@@ -414,14 +400,14 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
     return Efficiency(value, uncertainty, power_in, power_out, per_turn, tuple(contributions), left_out)
 
 
-def _dwell(pairs: Pairs, condition: Condition) -> tuple[Array, Signal | None]:
+def _dwell(driven: Powers, condition: Condition) -> tuple[Array, Signal | None]:
     """Time that the driver spends at each position, (position,), 1 in the mean, and the course it was taken from.
 
     By the driver whose mean speed is that of the angle; equal, of no course, if it does not turn one way throughout or
     the cycle is a time. By the mean course, not that of each turn: 1/ω of a noisy ω is too large by its variance.
     """
     if np.isfinite(condition.speed):
-        speeds = [speed for _, speed in pairs.driven]
+        speeds = [speed for _, speed in driven]
         driver = min(speeds, key=lambda speed: abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)))
         if np.isfinite(driver.mean).all() and np.min(driver.mean) * np.max(driver.mean) > 0:
             dwell = 1 / np.abs(driver.mean)

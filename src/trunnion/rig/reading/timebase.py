@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity, counted
-from trunnion.model.units import UnitError
+from trunnion.model.units import UnitError, normalise
 from trunnion.rig.reading.mapping import TimeBase
 from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.units import HERTZ, alike, dimensions
@@ -25,6 +26,7 @@ Say = Callable[[Finding | str | None], None]  # takes a finding, or a sentence a
 GAP = 1.5  # times the usual step
 COUNTED = 2.0**53  # steps from the first row to the last, beyond which a float is no count
 UNEVEN = 0.2  # of the usual step, standard deviation
+_PER_MINUTE = re.compile(r"1\s*/\s*[Mm]in|[Mm]in\^?-1")  # in a heading; in a model file it may be turns or radians
 
 
 @dataclass(frozen=True)
@@ -112,8 +114,11 @@ def unit_of(
 ) -> tuple[str, float]:
     """Unit of a column, and its factor to SI: the mapping's, else the file's, else one that is assumed.
 
-    where: the entry of the mapping that has the key `unit`. What the file states otherwise is a finding.
+    where: the entry of the mapping that has the key `unit`. What the file states otherwise is a finding. A speed of
+    rotation in 1/min is one in rpm.
     """
+    if assumed == "rad/s" and _PER_MINUTE.fullmatch(normalise(column.unit).strip()):
+        column = replace(column, unit="rpm")
     unit = unit_stated or column.unit or assumed
     if not (unit_stated or column.unit) and assumed:
         what = f"the column '{name}' has no unit; SI is assumed ({assumed})"
@@ -131,7 +136,7 @@ def unit_of(
             size, of_file = dimensions(column.unit)
         except UnitError:
             return unit, factor
-        turns = of_file == HERTZ and alike(kind, dimensions("rad/s")[1])  # 1/min where the mapping has to say rpm
+        turns = of_file == HERTZ and alike(kind, dimensions("rad/s")[1])  # a setting in 1/min, its entry says rpm
         turns = turns and bool(np.isclose(factor / size, (1, 2 * np.pi)).any())
         if not turns and not (alike(of_file, kind) and size == factor):
             times = f": all values are {factor / size:.3g} times those of the file" if alike(of_file, kind) else ""
@@ -161,23 +166,15 @@ def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
     """
     groups: dict[tuple[str, ...], list[Finding]] = {}
     for finding in findings:
-        key = (
-            finding.severity,
-            finding.where.partition(" ")[0],
-            finding.code,
-            finding.remedy,
-            finding.what if same else "",
-        )
-        groups.setdefault(key, []).append(finding)
+        kind, text = finding.where.partition(" ")[0], finding.what if same else ""
+        groups.setdefault((finding.severity, kind, finding.code, finding.remedy, text), []).append(finding)
     merged = []
-    for group in groups.values():
+    for (_, kind, *_), group in groups.items():
         first, files = group[0], list(dict.fromkeys(Path(finding.file).name for finding in group if finding.file))
         if len(group) > 1:
-            where = (
-                first.where if len({finding.where for finding in group}) == 1 else f"{first.where.partition(' ')[0]}s"
-            )
-            named = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
-            what = f"{first.what} — {len(group)} such findings" + (f": {named}" if files else "")
+            where = first.where if len({finding.where for finding in group}) == 1 else f"{kind}s"
+            named = f": {', '.join(files[:4])}" + ", …" * (len(files) > 4) if files else ""
+            what = f"{first.what} — {len(group)} such findings{named}"
             first = replace(first, what=what, where=where, file="", line=None)
         merged.append(first)
     return merged

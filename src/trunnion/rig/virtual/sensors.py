@@ -118,19 +118,12 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
     quantities = {"range": sensor.range, "span": sensor.span, "noise": sensor.noise, "offset": sensor.offset,
                   "accuracy.zero": sensor.accuracy.zero, "drift": sensor.drift}  # fmt: skip
     sizes, findings = dict.fromkeys(quantities, math.inf), list[Finding]()
-    for (
-        key,
-        amount,
-    ) in quantities.items():  # of what is measured or of the readings; a drift has a sign, others have none
-        over = "/s" * (key == "drift")
-        if amount is None or amount.plain:
-            sizes[key] = math.inf if amount is None else amount.value
-            continue
-        resolved_amount = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
-        try:
-            sizes[key] = (scale.factor if over else abs(scale.factor)) * scale.reading(
-                resolved_amount, "zero" if over else key
-            )
+    for key, amount in ((key, amount) for key, amount in quantities.items() if amount is not None):
+        over = "/s" * (key == "drift")  # which has a sign; others have none
+        per_second = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
+        factor = scale.factor if over else abs(scale.factor)
+        try:  # of what is measured, or of the readings
+            sizes[key] = amount.value if amount.plain else factor * scale.reading(per_second, "zero" if over else key)
         except UnitError:
             units = dict.fromkeys(f"{item}{over}" for item in (unit, reading))
             what = f"'{amount.source}' is not in {' or in '.join(units)}"
@@ -154,11 +147,8 @@ def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
         readings = [sensor.unit or unit]
         dimensions(readings[0])
     else:  # `mV` of `mV/(N m)`, `V` of `N m/V`
-        readings = [
-            sensitivity.unit.partition("/")[0].strip(),
-            sensitivity.unit.rpartition("/")[2].strip("() "),
-            *READINGS,
-        ]
+        first, last = sensitivity.unit.partition("/")[0].strip(), sensitivity.unit.rpartition("/")[2].strip("() ")
+        readings = [first, last, *READINGS]
     for reading in filter(None, readings):
         with suppress(UnitError):
             of_sensor = scale_of(sensor.measures, reading, sensitivity)

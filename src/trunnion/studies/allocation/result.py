@@ -151,8 +151,6 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
     # the criterion says what is to be kept
     findings_kept = [finding for finding in findings_of(toleranced) if not finding.code.startswith("limit.missed")]
-    findings = list(_findings(allocated, toleranced))
-    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     attributes: dict[str, Any] = {
         "kind": "allocation",
         "found": int(allocated.answer.found),
@@ -165,8 +163,7 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
             for price in allocated.prices.values()
         ],
         **scales_in(toleranced).summary([*_summary(allocated, arrays, toleranced), *summary_of(toleranced)]),
-        "findings": finding_rows([*findings, *findings_kept]),
-        "missed": [f"{finding.where}: {finding.what}".lstrip(": ") for finding in errors],
+        "findings": finding_rows([*_findings(allocated, toleranced), *findings_kept]),
     }
     return with_variables(toleranced, variables).assign_attrs(encoded(attributes))
 

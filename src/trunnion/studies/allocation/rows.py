@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import scales_of
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 from trunnion.studies.allocation.problem import AllocationProblem, Criterion, RowEffects
@@ -93,9 +94,11 @@ def _of_measure(study: ToleranceStudy, bought: Mapping[str, float], criterion: C
     of, system, values = study.linear.measures[k], study.run.system, study.run.values
     window, limited = of.reference.window, bool(np.any(np.isfinite(ends)))
     halves = np.array([bought.get(name, 1.0) for name in study.inputs.names])
+    unit = of.measure.figure_unit(system, values)
+    floor = scales_of(study.run).floor(unit)
 
     def effects_of(first: FirstOrder) -> RowEffects:
-        effects = _effects(study, bought, criterion, first)
+        effects = _effects(study, bought, criterion, first, floor)
         lower, upper = np.repeat(ends[:, None], len(effects.worst), axis=1)
         return replace(effects, lower=lower, upper=upper)
 
@@ -106,7 +109,7 @@ def _of_measure(study: ToleranceStudy, bought: Mapping[str, float], criterion: C
             effects_of(first),
             labels=(f"measures.{of.measure.name}",) * count,
             places=tuple(f" at {dial.at(i)}" if several and np.isfinite(time[i]) else "" for i in range(count)),
-            units=(of.measure.figure_unit(system, values),) * count,
+            units=(unit,) * count,
         )
         finite = limited & np.all(np.isfinite(effects.spread()), axis=1)
         return Rows(effects, np.full(count, k), position, np.full(count, moves)).picked(finite)
@@ -134,11 +137,15 @@ def _everywhere(of: Of) -> bool:
     return root or (by_position(of.reference) and of.place >= 0)
 
 
-def _effects(study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, first: FirstOrder) -> RowEffects:
-    """Effects (row, contribution) without their limits."""
+def _effects(
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, first: FirstOrder, floor: float
+) -> RowEffects:
+    """Effects (row, contribution) without their limits. floor: what is rounding of the measure."""
     count = len(study.inputs.names)
-    slopes = first.sensitivity.reshape(count, -1)
-    lower, upper, half, shift, deviation = np.array(first.spread).reshape(5, count, -1)
+    spread = np.array(first.spread).reshape(5, count, -1)
+    still = (spread[2] > 0) & (spread[2] <= floor)  # a slope of rounding would bound a tolerance at kilometres
+    slopes = np.where(still, 0.0, first.sensitivity.reshape(count, -1))
+    lower, upper, half, shift, deviation = np.where(still, 0.0, spread)
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
         if study.effects.is_zone(i):

@@ -167,7 +167,6 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
         "steps": study.steps,
         **scales_of(study.run).summary(summary(outcome, counted, units, dial)),
         "findings": finding_rows(findings),
-        "missed": [f"{each.where}: {each.what}" for each in findings if each.code.startswith("limit.missed")],
     }
     return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(study.plan.times, *dial)})
 

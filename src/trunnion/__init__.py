@@ -5,14 +5,10 @@ Names are loaded when first used, so that importing the package costs nothing.
 
 from __future__ import annotations
 
+from trunnion.lazy import TYPE_CHECKING, loader
 from trunnion.version import __version__ as __version__
 
-TYPE_CHECKING = False  # as a type checker takes it for True; `typing` itself is not needed to start
-
-
 if TYPE_CHECKING:
-    from typing import Any
-
     from trunnion import dual as dual
     from trunnion import exchange, rig
     from trunnion.cycle.analyse import analyse
@@ -43,18 +39,20 @@ _PLACES = {
     "assemble": ("trunnion.studies.assembly", "assemble"),
     "check": ("trunnion.cycle.inspect", "check"),
     "design": ("trunnion.studies.design", "design"),
+    "dual": ("trunnion.dual", ""),
+    "exchange": ("trunnion.exchange", ""),
     "locking": ("trunnion.cycle.locking", "locking"),
     "play": ("trunnion.studies.play", "play"),
     "plot": ("trunnion.views.shown", "plot"),
     "read": ("trunnion.model.mechanism", "read_mechanism"),
     "report": ("trunnion.views.shown", "report"),
+    "rig": ("trunnion.rig", ""),
     "save": ("trunnion.results.export", "save"),
     "simulate": ("trunnion.dynamics.simulate", "simulate"),
     "sweep": ("trunnion.studies.sweep.study", "sweep"),
     "tolerance": ("trunnion.studies.tolerance.study", "tolerance"),
 }
 _RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "simulate", "sweep", "tolerance"}
-_MODULES = {"dual": "trunnion.dual", "exchange": "trunnion.exchange", "rig": "trunnion.rig"}
 
 __all__ = [
     "FrictionMethod",
@@ -79,19 +77,7 @@ __all__ = [
     "tolerance",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from where it lives."""
-    from importlib import import_module
-
-    if name in _MODULES:
-        return import_module(_MODULES[name])
-    if name not in _PLACES:
-        raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
-    module, attribute = _PLACES[name]
-    if name in _RESULTS:
-        import_module("trunnion.accessor")  # result.trunnion
-    return getattr(import_module(module), attribute)
+__getattr__ = loader("trunnion", _PLACES, _RESULTS)
 
 
 def __dir__() -> list[str]:

@@ -50,6 +50,7 @@ DEGREE = np.pi / 180
     [
         "time [ms], angle [deg]\n0,0\n50,12.5\n100,90\n",
         "time [ms]; angle [deg]\n0;0\n50; 12,5\n1e2;90\n",
+        "time (ms); angle in deg\n0;0\n50; 12,5\n1e2;90\n",
         "time [ms]\tangle [deg]\r\n0\t0\r\n50\t12,5\r\n100\t90.0\r\n",
         '\ufeff"time [ms]";"angle, of the crank [°]"\n# measured\n\n0;0;\n50;12.5\n100;+90\n',
         f"0,0\n0.05,{12.5 * DEGREE!r}\n.1,{90 * DEGREE!r}\n",
@@ -103,7 +104,7 @@ BAD = [
     ("t [mm];q [N]\n0;1\n2;1\n", ["points.csv:1: error: t [mm]: its unit is that of a length, the column is of time",
                                  "points.csv:1: error: q [N]: its unit is that of a force, the column is of angle"]),
     ("t [mss];q\n0;1\n2;1\n", ["points.csv:1: error: t [mss]: the unit 'mss' is not known"]),
-    ("t (ms);q\n0;1\n2;1\n", ["points.csv:1: error: t (ms): a unit stands in brackets — write [ms]"]),
+    ("t (mm);q\n0;1\n2;1\n", ["points.csv:1: error: t (mm): its unit is that of a length, the column is of time"]),
 ]  # fmt: skip
 
 

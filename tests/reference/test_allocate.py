@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from allocations import rocker_sensitivities
+from scipy.optimize import minimize_scalar
 from scipy.stats import multivariate_normal
 
 import trunnion
@@ -40,21 +41,40 @@ def dimensions(result: Any, key: str = "tolerance") -> Any:
     return 1e3 * result[key].sel(parameter=[f"dimensions.l{i}" for i in range(1, 5)]).values
 
 
-def test_reference_values() -> None:
-    """Σ B/t^0.45, B = 1, 0.6, 1, 0.8, |Δθ₄| ≤ 0.1° at 72 angles, the same from two starts."""
-    for start in (0.001, 1.0):
+def by_one_limit(angle: float, criterion: str = "worst-case") -> tuple[Any, float]:
+    """Half widths, mm, and cost of the example with its limit at one crank angle alone, in closed form."""
+    s, b, k = np.abs(rocker_sensitivities(np.array([angle])))[0], np.array([1, 0.6, 1, 0.8]), 0.45
+    if criterion == "worst-case":
+        t = (b / s) ** (1 / (k + 1))
+        t *= LIMIT / (s @ t)
+    else:
+        t = (b / s**2) ** (1 / (k + 2))
+        t *= LIMIT / np.linalg.norm(s * t)
+    return t, float(np.sum(b / t**k))
+
+
+@pytest.mark.parametrize("criterion", ["worst-case", "rss"])
+def test_limits_are_kept_over_the_whole_cycle(criterion: str) -> None:
+    """Σ B/t^0.45, |Δθ₄| ≤ 0.1°: the dearest single angle keeps all others, whatever the steps and the start."""
+    place = minimize_scalar(
+        lambda angle: -by_one_limit(angle, criterion)[1], bounds=(0.2, 0.5), method="bounded", options={"xatol": 1e-12}
+    )
+    t, cost = by_one_limit(place.x, criterion)
+    dense = np.abs(slopes(100_000)) * t / 1e3 / LIMIT
+    assert np.max(np.linalg.norm(dense, axis=1, ord=1 if criterion == "worst-case" else 2)) < 1 + 1e-8
+    for start, steps in ((0.001, 12), (1.0, 360)):
         model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml").with_tolerances(
             {f"l{i}": start * 1e-3 for i in range(1, 5)}
         )
-        result = trunnion.allocate(model, steps=72, samples=0)
-        assert dimensions(result) == pytest.approx([0.035238, 0.021336, 0.028878, 0.034654], abs=5e-7)
-        assert float(result["cost_total"]) == pytest.approx(16.456705, abs=5e-7)
+        result = trunnion.allocate(model, criterion=criterion, steps=steps, samples=0)
+        assert dimensions(result) == pytest.approx(t, rel=5e-5)  # the cost is flat at its least
+        assert float(result["cost_total"]) == pytest.approx(cost, rel=1e-8)
         assert result.attrs["proven"]
         assert float(result["gap"]) < 1e-9
-    t = dimensions(result) * 1e-3
-    taken = np.abs(slopes()) @ t / LIMIT
-    assert np.max(taken) == pytest.approx(1, abs=1e-9)
-    assert result["used_curve"].values[0] == pytest.approx(taken, abs=1e-9)
+        bought = model.with_tolerances(half_widths(result))
+        toleranced = trunnion.tolerance(bought, methods=["linear"], steps=90)
+        key = "worst_case_upper" if criterion == "worst-case" else "rss"
+        assert float(toleranced[key][0]) <= LIMIT * (1 + 1e-8)
 
 
 @pytest.mark.parametrize("criterion", ["worst-case", "rss"])
@@ -62,15 +82,9 @@ def test_closed_forms_of_one_limit(criterion: str) -> None:
     """t ∝ (B/|S|)^(1/(k + 1)) in the worst case, t ∝ (B/S²)^(1/(k + 2)) of RSS."""
     model = fourbar(measures={"θ": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}})
     result = trunnion.allocate(model, criterion=criterion, samples=0)
-    s, b, k = np.abs(slopes()[12]), np.array([1, 0.6, 1, 0.8]), 0.45
-    if criterion == "worst-case":
-        t = (b / s) ** (1 / (k + 1))
-        t *= LIMIT / (s @ t)
-    else:
-        t = (b / s**2) ** (1 / (k + 2))
-        t *= LIMIT / np.linalg.norm(s * t)
-    assert dimensions(result) == pytest.approx(1e3 * t, rel=1e-6)  # a gap of 1e-6 would leave them open by 1e-3
-    assert float(result["cost_total"]) == pytest.approx(float(np.sum(b / (1e3 * t) ** k)), rel=1e-8)
+    t, cost = by_one_limit(np.radians(60), criterion)
+    assert dimensions(result) == pytest.approx(t, rel=1e-6)  # a gap of 1e-6 would leave them open by 1e-3
+    assert float(result["cost_total"]) == pytest.approx(cost, rel=1e-8)
     # more room is worth what the cost falls by
     wider = trunnion.allocate(
         fourbar(measures={"θ": {"angle": "rocker", "at": "60 deg", "limit": "±0.1001 deg"}}),

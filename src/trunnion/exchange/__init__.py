@@ -6,11 +6,9 @@ Names are loaded when first used.
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # as in `trunnion`
+from trunnion.lazy import TYPE_CHECKING, loader
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from trunnion.exchange.draft import Body as Body
     from trunnion.exchange.draft import Draft as Draft
     from trunnion.exchange.draft import Pair as Pair
@@ -20,25 +18,18 @@ if TYPE_CHECKING:
     from trunnion.exchange.model_file import model_text as model_text
 
 _PLACES = {
-    "FORMATS": "formats",
-    "Body": "draft",
-    "Draft": "draft",
-    "Pair": "draft",
-    "export_model": "formats",
-    "import_file": "formats",
-    "model_text": "model_file",
+    "FORMATS": ("trunnion.exchange.formats", "FORMATS"),
+    "Body": ("trunnion.exchange.draft", "Body"),
+    "Draft": ("trunnion.exchange.draft", "Draft"),
+    "Pair": ("trunnion.exchange.draft", "Pair"),
+    "export_model": ("trunnion.exchange.formats", "export_model"),
+    "import_file": ("trunnion.exchange.formats", "import_file"),
+    "model_text": ("trunnion.exchange.model_file", "model_text"),
 }
 
 __all__ = ["FORMATS", "Body", "Draft", "Pair", "export_model", "import_file", "model_text"]
 
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from where it lives."""
-    from importlib import import_module
-
-    if name not in _PLACES:
-        raise AttributeError(f"module 'trunnion.exchange' has no attribute '{name}'")
-    return getattr(import_module(f"trunnion.exchange.{_PLACES[name]}"), name)
+__getattr__ = loader("trunnion.exchange", _PLACES)
 
 
 def __dir__() -> list[str]:

@@ -2,15 +2,13 @@
 
 A model may name a file in its own folder only, see `text.in_folder`.
 
-Two columns, first time or drive coordinate, then value; separated by semicolon, tab or comma, the first of these that
-the first line has. With semicolon or tab a number may have a decimal comma. A first row of texts is a header, whose
-units stand in brackets: `time [ms], angle [deg]`; numbers without a unit are SI. Empty lines and lines with # are
-passed over. Of a file with more columns a model names two by their headers, see `_named_columns`.
+Two columns, first time or drive coordinate, then value. With semicolon or tab between them a number may have a decimal
+comma. A first row of texts is a header with units, see `csv_text`; numbers without a unit are SI. Of a file with more
+columns a model names two by their headers, see `_named_columns`.
 """
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 import re
@@ -20,6 +18,7 @@ from typing import Any, NamedTuple
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.csv_text import cells_of, heading, numbered, separator_of, units_below
 from trunnion.model.expression import literal
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
@@ -35,9 +34,6 @@ MAX_ROWS = 10_000  # points of a spline; an analysis of 360 positions then takes
 MAX_OWN_ROWS = 20_000  # of all files that a model names: reading them takes some seconds
 SHOWN = 8  # findings about one file; the rest is counted
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
-_IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]\s*$")
-_IN_PARENTHESES = re.compile(r"\(([^()]*)\)\s*$")
-_NO_UNIT = ("", "-", "–", "1")
 
 Row = tuple[int, list[str]]  # line and cells
 
@@ -118,20 +114,14 @@ def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any
 
 def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> list[Finding]:
     """The findings, those about points with the file and line that these came from and a few for each file."""
-    placed = [finding for finding in findings if not any(_speaks_of(finding, points) for points in read)]
+    placed = list(findings)
     for points in read:
-        own_findings = [finding for finding in findings if _speaks_of(finding, points)]
-        placed += _few([finding.at(points.file, _line(finding, points)) for finding in own_findings])
+        of_points = [finding for finding in findings if f"{finding.where}.".startswith(f"{points.where}.")]
+        indices = [finding.where[len(points.where) + 1 :].partition(".")[0] for finding in of_points]
+        lines = [points.lines[int(index) if index.isdecimal() else 0] for index in indices]
+        placed = [finding for finding in placed if not f"{finding.where}.".startswith(f"{points.where}.")]
+        placed += _few([finding.at(points.file, line) for finding, line in zip(of_points, lines, strict=True)])
     return placed
-
-
-def _speaks_of(finding: Finding, points: TablePoints) -> bool:
-    return f"{finding.where}.".startswith(f"{points.where}.")
-
-
-def _line(finding: Finding, points: TablePoints) -> int:
-    index = finding.where[len(points.where) + 1 :].partition(".")[0]
-    return points.lines[int(index) if index.isdecimal() else 0]
 
 
 def _few(findings: list[Finding]) -> list[Finding]:
@@ -144,20 +134,16 @@ def _few(findings: list[Finding]) -> list[Finding]:
 
 def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
     """Section and name of the driver or table that a name means; `drivers.A` and `tables.A` tell two apart."""
-    sections = {section: data.get(section) for section in ("drivers", "tables")}
-    names = {section: list(part) if isinstance(part, Mapping) else [] for section, part in sections.items()}
-    section, dot, key = name.partition(".")
-    if dot and key in names.get(section, ()):
-        return section, key
-    holders = [holder for holder in names if name in names[holder]]
+    parts = {section: part for section in ("drivers", "tables") if isinstance(part := data.get(section), Mapping)}
+    holders = [(section, key) for section in parts for key in parts[section] if name in (key, f"{section}.{key}")]
     if len(holders) == 2:
         raise MechanismError(
             Finding(f"'{name}' is a driver and a table", remedy=f"say drivers.{name} or tables.{name}")
         )
     if not holders:
-        remedy = nearest(name, [*names["drivers"], *names["tables"]])
+        remedy = nearest(name, [key for part in parts.values() for key in part])
         raise MechanismError(Finding(f"there is no driver or table '{name}'", remedy=remedy))
-    return holders[0], name
+    return holders[0]
 
 
 def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]:
@@ -214,31 +200,31 @@ def _columns(
     noun, each, example, fewer = _TABLE if len(kinds) == 2 else _SAMPLE
     try:
         text = read_text(path, f"a {noun}", MAX_BYTES, f"write {each}, such as {example}")
-        numbered = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
-                  if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
-        if not numbered:
+        lines = numbered(io.StringIO(text, newline=None))
+        if not lines:
             raise MechanismError(Finding("has only comments", remedy=f"write {each}", line=1))
-        if len(numbered) > MAX_ROWS + 1:
-            raise MechanismError(Finding(f"has {len(numbered)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
-        separator = next((mark for mark in ";\t" if mark in numbered[0][1]), "," if len(kinds) == 2 else ";")
-        rows = [(number, _cells(line, separator)) for number, line in numbered]
+        if len(lines) > MAX_ROWS + 1:
+            raise MechanismError(Finding(f"has {len(lines)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
+        separator = separator_of(lines[0][1], "," if len(kinds) == 2 else ";")
+        rows = [(number, _cells(line, separator)) for number, line in lines]
+        heads, units = list[str](), [""] * len(rows[0][1])
+        if names or not any(_number(cell, separator) for cell in rows[0][1]):
+            heads, units = map(list, zip(*(heading(cell, unit, names or ()) for cell in rows[0][1]), strict=True))
+            if names and len(rows) > 1 and (below := units_below(units, rows[1][1])):
+                units = below
+                del rows[1]
         if names:
-            rows = _with_units(_named_columns(rows, names))
-        if len(rows[0][1]) != len(kinds):
-            what = f"has {len(rows[0][1])} column{'s' * (len(rows[0][1]) > 1)}, a {noun} has {len(kinds)}"
+            units, rows = _named_columns(rows, heads, units, names)
+        if len(units) != len(kinds):
+            what = f"has {len(units)} column{'s' * (len(units) > 1)}, a {noun} has {len(kinds)}"
             raise MechanismError(Finding(what, remedy=_OTHER_COLUMNS[len(kinds)], line=rows[0][0]))
-        headed = bool(names) or not any(_number(cell, separator) for cell in rows[0][1])
-        units = _units(rows[0], kinds) if headed else [""] * len(kinds)
-        numbers = rows[1:] if headed else rows
+        _check_units(rows[0], units, kinds)
+        numbers = rows[1:] if heads else rows
         if len(numbers) < 2:
             what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a {noun} needs two"
             raise MechanismError(Finding(what, remedy=f"add rows such as {example}", line=rows[-1][0]))
         if findings := list(_unreadable(numbers, separator, len(kinds))):
             raise MechanismError(_few(findings))
-    except csv.Error as error:
-        raise MechanismError(
-            Finding(f"is not CSV: {error}", remedy="check that it is a text file", file=label)
-        ) from None
     except MechanismError as error:
         raise MechanismError([finding.at(label, finding.line) for finding in error.findings]) from None
     return units, [(line, [_number(cell, separator) for cell in cells]) for line, cells in numbers]
@@ -251,22 +237,22 @@ _OTHER_COLUMNS = {
 }
 
 
-def _named_columns(rows: Sequence[Row], names: Sequence[str]) -> list[Row]:
-    """The rows with two of their cells: below the headers that are these names, which may leave out the unit.
+def _named_columns(
+    rows: Sequence[Row], heads: Sequence[str], units: Sequence[str], names: Sequence[str]
+) -> tuple[list[str], list[Row]]:
+    """The units and cells of two columns: below the headers that are these names, which may leave out the unit.
 
     MechanismError if none or several have a name.
     """
     line, header = rows[0]
-    plain = [re.sub(_IN_BRACKETS, "", cell).strip() for cell in header]
     places: list[int] = []
     findings: list[Finding] = []
     for name in names:
-        fitting = [i for i, cell in enumerate(header) if cell == name] or [
-            i for i, cell in enumerate(plain) if cell == name
-        ]
+        fitting = [i for i, cell in enumerate(header) if cell == name]
+        fitting = fitting or [i for i, head in enumerate(heads) if head == name]
         if len(fitting) != 1:
             what = f"{'has no column' if not fitting else f'has {len(fitting)} columns'} '{name[:60]}'"
-            remedy = nearest(name, plain) if not fitting else "give each column a name of its own"
+            remedy = nearest(name, heads) if not fitting else "give each column a name of its own"
             findings.append(Finding(what, remedy=remedy, line=line))
         places += fitting[:1]
     findings += [
@@ -275,22 +261,12 @@ def _named_columns(rows: Sequence[Row], names: Sequence[str]) -> list[Row]:
     ]  # fmt: skip
     if findings:
         raise MechanismError(_few(findings))
-    return [(number, [cells[i] if i < len(cells) else "" for i in places]) for number, cells in rows]
-
-
-def _with_units(rows: Sequence[Row]) -> list[Row]:
-    """The rows without one of units below the header, whose cells then stand in the header's brackets."""
-    (line, header), *others = rows
-    below = others[0][1] if others else [""]
-    if not all(cell in _NO_UNIT or _is_unit(cell) for cell in below) or not any(map(_is_unit, below)):
-        return list(rows)
-    columns = zip(header, below, strict=True)
-    return [(line, [f"{cell} [{unit}]" if unit and not _IN_BRACKETS.search(cell) else cell for cell, unit in columns]),
-            *others[1:]]  # fmt: skip
+    picked = [(number, [cells[i] if i < len(cells) else "" for i in places]) for number, cells in rows]
+    return [units[i] for i in places], picked
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    cells = [cell.strip() for cell in next(csv.reader([line.rstrip("\n")], delimiter=separator, skipinitialspace=True))]
+    cells = cells_of(line, separator)
     while len(cells) > 1 and not cells[-1]:  # a separator at the end of a line
         cells.pop()
     return cells
@@ -317,31 +293,17 @@ def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> Iterator[F
                 yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
 
 
-def _units(header: Row, kinds: Sequence[Kind]) -> list[str]:
-    """The units of a header, empty where there is none; MechanismError if they are not those of the columns."""
+def _check_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> None:
+    """MechanismError if the units of a header are not those of the columns."""
     line, cells = header
-    units, findings = [], []
-    for cell, kind in zip(cells, kinds, strict=True):
-        bracketed, rounded = _IN_BRACKETS.search(cell), _IN_PARENTHESES.search(cell)
-        text = bracketed[1].strip() if bracketed else ""
-        units.append("" if text in _NO_UNIT else text)
-        remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
+    findings = []
+    for cell, text, kind in zip(cells, units, kinds, strict=True):
         try:
-            if rounded and not bracketed and _is_unit(rounded[1]):
-                remedy = f"write [{rounded[1]}]"
-                raise UnitError("a unit stands in brackets")
-            if units[-1] and not kind.accepts(dimension := Quantity.read(f"1 {text}").check({})):
+            if text and not kind.accepts(dimension := Quantity.read(f"1 {text}").check({})):
                 what = f"its unit is that of {dimension_text(dimension or NUMBER)}, the column is of {kind.name}"
                 raise UnitError(what)
         except UnitError as error:
+            remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
             findings.append(Finding(f"{cell[:40]}: {error.what[:120]}", remedy=remedy, line=line))
     if findings:
         raise MechanismError(findings)
-    return units
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        return text.strip() not in _NO_UNIT and bool(unit(text.strip()))
-    except UnitError:
-        return False

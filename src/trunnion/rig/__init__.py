@@ -6,11 +6,9 @@ numbers of the model from it. Names are loaded when first used.
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # as in `trunnion`
+from trunnion.lazy import TYPE_CHECKING, loader
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from trunnion.rig.comparison import compare as compare
     from trunnion.rig.identification.run import identify as identify
     from trunnion.rig.reading.measurement import Measurement as Measurement
@@ -29,17 +27,7 @@ _PLACES = {
 
 __all__ = ["Measurement", "Observation", "compare", "identify", "observe", "read"]
 
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from where it lives."""
-    from importlib import import_module
-
-    if name not in _PLACES:
-        raise AttributeError(f"module 'trunnion.rig' has no attribute '{name}'")
-    if name in ("compare", "identify"):
-        import_module("trunnion.accessor")  # result.trunnion
-    module, attribute = _PLACES[name]
-    return getattr(import_module(module), attribute)
+__getattr__ = loader("trunnion.rig", _PLACES, ("compare", "identify"))
 
 
 def __dir__() -> list[str]:

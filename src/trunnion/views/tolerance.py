@@ -63,8 +63,9 @@ COLUMNS = {"linear": "linear", "searched": "searched", "sampled": "samples", "in
 
 def tables(result: xr.Dataset) -> list[Table]:
     """Of each measure its figures and contributions; then the samples that failed, and the yield of all limits."""
-    parts, yields = list[Table](), _overall(result)
-    for read in readings(result):
+    parts, reads = list[Table](), readings(result)
+    yields = _overall(result, reads)
+    for read in reads:
         parts += _measure_tables(read, read.heading + (f"; limits {read.limits_said}" if read.limited else ""))
     together = [Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])] if yields else []
     return [*parts, *failed(result), *together]
@@ -173,10 +174,10 @@ def corners(read: MeasureReading) -> Table | None:
     return Table(f"worst corners of {read.name}, of the nonlinear model", head, rows)
 
 
-def overview(result: xr.Dataset) -> Table:
+def overview(reads: Sequence[MeasureReading]) -> Table:
     """A row for each measure: what is asked and what comes out."""
     rows, label = [], ""
-    for read in readings(result):
+    for read in reads:
         cells, label = cells_of(read), read.rss_label
         worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
         sampled = [cells[key].get("sampled") or cells[key].get("linear", "")
@@ -197,22 +198,21 @@ def failed(result: xr.Dataset) -> list[Table]:
     return [Table("failed samples: outside every limit, excluded from mean and quantiles", ["", "samples", ""], rows)]
 
 
-def _overall(result: xr.Dataset) -> tuple[float, float, float] | None:
+def _overall(result: xr.Dataset, reads: Sequence[MeasureReading]) -> tuple[float, float, float] | None:
     """The yield of all limits and its interval, where more than one measure has limits."""
-    if "yield_all" not in result or sum(read.limited for read in readings(result)) < 2:
+    if "yield_all" not in result or sum(read.limited for read in reads) < 2:
         return None
     value, low, high = (float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high"))
     return None if math.isnan(value) else (value, low, high)
 
 
-def inputs(result: xr.Dataset) -> Table:
+def inputs(read: MeasureReading) -> Table:
     """Every toleranced number: nominal, limits, standard deviation, shift of its mean."""
-    read = readings(result)[0]
     units = {row.name: row.unit for row in read.contributions}
     keys = ("parameter_nominal", "parameter_lower", "parameter_upper", "parameter_deviation", "parameter_shift")
     nominal, lower, upper, *others = (read.row(key) for key in keys)
     rows = []
-    for j, path in enumerate(names(result, "parameter")):
+    for j, path in enumerate(names(read.result, "parameter")):
         unit = units[path]
         cells = [value_text(float(nominal[j]), unit), limits_in(float(lower[j]), float(upper[j]), unit, path)]
         rows.append([path, *cells, *(value_text(float(row[j]), unit, 4) if row.size else "" for row in others)])
@@ -366,13 +366,17 @@ def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None)
     ------
     MechanismError : if there is no such kind, none of the measures has it, or they are too many
     """
+    check_kind(kind, KINDS)
+    reads = _named(result, measures, KINDS[kind].ready)
+    if not reads:
+        raise MechanismError(Finding(f"no measure has a figure '{kind}'", "--kind", KINDS[kind].remedy))
+    return _drawn(result, KINDS[kind], reads)
+
+
+def _drawn(result: xr.Dataset, about: Kind, reads: Sequence[MeasureReading]) -> Figure:
+    """One kind of figure of some measures, a panel for each."""
     from trunnion.views.draw import figure as draw
 
-    check_kind(kind, KINDS)
-    about = KINDS[kind]
-    reads = _named(result, measures, about.ready)
-    if not reads:
-        raise MechanismError(Finding(f"no measure has a figure '{kind}'", "--kind", about.remedy))
     title = about.title if len(reads) > 1 else f"{about.title}: {reads[0].name}"
     return draw(title, result, [replace(about.panel(read), title=read.heading) for read in reads])
 
@@ -422,18 +426,19 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tol
         facts += [*counts((count, "sample")), (f"seed {result.attrs.get('seed', '')}", "")]
     facts.append(("", ", ".join(method.replace("-", " ") for method in methods)))
     missed = [row for row in attribute(result, "findings") if row["severity"] == "error"]  # they stand first
-    yields = _overall(result)
+    reads = readings(result)
+    yields = _overall(result, reads)
     about = f"All limits together: yield {share_interval(*yields)}" if yields else ""
-    parts = [Section("Measures", about, tables=[overview(result), *failed(result)])]
-    end = [Section("Toleranced parameters", tables=[inputs(result)])]
-    parts += [*first, *(_section(result, read) for read in readings(result))]
+    parts = [Section("Measures", about, tables=[overview(reads), *failed(result)])]
+    end = [Section("Toleranced parameters", tables=[inputs(reads[0])])]
+    parts += [*first, *(_section(result, read) for read in reads)]
     return page(result, kicker, facts, parts, missed=missed, end=end)
 
 
 def _section(result: xr.Dataset, read: MeasureReading) -> Section:
     """What there is of one measure."""
     about = "; ".join(part for part in (read.text, f"limits {read.limits_said}" if read.limited else "") if part)
-    pictures = [(f"{KINDS[kind].title} of {read.name}", figure(result, kind, [read.name])) for kind in drawable(read)]
+    pictures = [(f"{KINDS[kind].title} of {read.name}", _drawn(result, KINDS[kind], [read])) for kind in drawable(read)]
     corner = corners(read)
     first, *others = _measure_tables(read, "results")
     return Section(read.name, about, pictures, [first, *others[:1]], [*others[1:], *([corner] if corner else [])])

@@ -2,14 +2,12 @@
 
 Only the columns that are asked for are read. What is no number in them is NaN and counted, never replaced.
 
-In CSV the separator is the first of semicolon, tab and comma that the header has; with semicolon or tab a number may
-have a decimal comma. Units stand in brackets behind the name, `T1 [V]`, or in a row of their own below the names. Lines
-that begin with # are passed over, and so is what a logger writes above the header. Pandas reads the rows.
+In CSV what a logger writes above the header is passed over; `csv_text` says what the header tells. With semicolon or
+tab a number may have a decimal comma. Pandas reads the rows.
 """
 
 from __future__ import annotations
 
-import csv
 import importlib
 import importlib.util
 import re
@@ -24,8 +22,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import reading
-from trunnion.model.names import unguarded
-from trunnion.model.units import UnitError
+from trunnion.model.csv_text import NOTHING, TIME, bare, cells_of, heading, number, numbered, separator_of, units_below
 from trunnion.rig.reading.units import dimensions
 
 __all__ = ["FORMATS", "Column", "DataTable", "read_table"]
@@ -133,7 +130,6 @@ def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: 
 
 # ---- cells ----------------------------------------------------------------------------------------------------
 
-NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
 _COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:[.\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
 _GROUPED = {  # with a sign between thousands: only where decimals tell which of point and comma it is
     ",": re.compile(r"[-+]?\d{1,3}(?:([.\u00a0\u202f ])\d{3})+,\d+"),
@@ -141,15 +137,6 @@ _GROUPED = {  # with a sign between thousands: only where decimals tell which of
 }
 _WHOLE = re.compile(r"\d:\d\d:\d\d(?![\d.])", re.ASCII)  # seconds without a fraction
 _DAYTIME, _YEAR = re.compile(r"\d{1,2}:", re.ASCII), re.compile(r"\d{4}-", re.ASCII)
-_TIME = re.compile(r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]\s*)?\d{1,2}:[0-5]\d:[0-5]\d.*", re.ASCII)
-
-
-def _number(text: object) -> float:
-    """The number of a cell; NaN if it is none."""
-    try:
-        return float(text)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        return np.nan
 
 
 def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
@@ -169,9 +156,9 @@ def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
     rows = ["" if cell is None or (isinstance(cell, float) and np.isnan(cell)) else str(cell).strip() for cell in cells]
     between = {match[1]: "" for row in rows if (match := _GROUPED[decimal].fullmatch(row))}
     signs = str.maketrans({".": "?", ",": "?", "−": "-"} | between | {decimal: "."})
-    values = np.array([_number(row.translate(signs)) for row in rows])
+    values = np.array([number(row.translate(signs)) for row in rows])
     texts = [row for row, value in zip(rows, values, strict=True) if np.isnan(value) and row.casefold() not in NOTHING]
-    stamps = texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any()
+    stamps = texts and TIME.fullmatch(texts[0]) and not np.isfinite(values).any()
     example = re.sub(r"[\x00-\x1f\x7f-\x9f]+", "�", texts[0])[:40] if texts else ""  # NUL of a torn file
     return Column(values, unit, len(texts), example, tuple(rows) if stamps else ())
 
@@ -182,11 +169,6 @@ FIRST = 200  # lines in which the header may stand, and as many rows that show h
 LONGEST = 1 << 24  # signs in which a line has to end
 WIDE = 40  # columns from which those that are not asked for are passed over, and too many cells in a row not seen
 GERMAN = ("Grad", "U/min", "Umin", "Umdr./min")  # units in headings, if not all are read without the mapping's word
-_NO_UNIT = ("", "-", "–", "1")
-_HEADING = re.compile(  # T [V]; and with units that are in use T (V), T / V, T in V
-    r"(?P<name>.*?)\s*\[(?P<sure>[^\[\]]*)\]|(?P<before>.*?\S)\s*(?:\((?P<round>[^()]+)\)|(?:\s/|\sin)\s+(?P<last>\S.*))",
-    re.DOTALL,
-)
 
 
 def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
@@ -198,10 +180,9 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
     header, separator, heads = _header(path, lines, wanted)
     labels, units = map(list, zip(*heads, strict=True))
     places = _places(path, labels, names, optional)
-    rows = [(place, _cells(line, separator)) for place, line in lines if place > header]
-    if rows and _words(rows[0][1]):  # a row of units
-        header, below = rows.pop(0)
-        units = [unit or text for unit, text in zip(units, [*map(_bare, below), *[""] * len(units)], strict=False)]
+    rows = [(place, cells_of(line, separator)) for place, line in lines if place > header]
+    if rows and (more_units := units_below(units, rows[0][1])):
+        header, units = rows.pop(0)[0], more_units
     sample = [row[place] for _, row in rows[:FIRST] for place in places.values() if place < len(row)]
     decimal = "," if separator != "," and any(_COMMA.fullmatch(cell) for cell in sample) else "."
     version = tuple(int(part) for part in re.findall(r"\d+", pd.__version__)[:2])
@@ -247,20 +228,18 @@ def _first_lines(path: Path) -> tuple[list[tuple[int, str]], str]:
     if any("\0" in line or len(line) == LONGEST for line in lines):
         remedy = "check that it is CSV, with a row of the table in each line"
         raise _failed(path, f"is not a text file: a NUL, or no end of a line in {LONGEST >> 20} MiB", remedy, 1)
-    numbered = [(place, line.rstrip("\n")) for place, line in enumerate(lines)
-              if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
-    if not numbered:
+    if not (counted := numbered(lines)):
         raise _failed(path, "is empty but for comments", "check that the recording was saved", 1)
-    return numbered, encoding
+    return [(line - 1, text) for line, text in counted], encoding
 
 
 def _header(path: Path, lines: list[tuple[int, str]], columns: set[str]) -> tuple[int, str, list[tuple[str, str]]]:
     """Place, separator, and names with units of the line that has the most of the columns; loggers write above it."""
     best: tuple[int, int, str, list[tuple[str, str]]] = (0, 0, "", [])
     for place, line in lines[:FIRST]:
-        bare = re.sub(r'"[^"]*"', "", line)
-        separator = next((sign for sign in ";\t" if sign in bare), ",")
-        heads = [_heading(cell, columns) for cell in _cells(line, separator)]
+        separator = separator_of(line)
+        cells = cells_of(line, separator)
+        heads = [heading(cell, lambda unit: unit in GERMAN or dimensions(unit), columns) for cell in cells]
         hits = len({name for name, _ in heads} & columns)
         if hits > best[0]:
             best = hits, place, separator, heads
@@ -270,42 +249,6 @@ def _header(path: Path, lines: list[tuple[int, str]], columns: set[str]) -> tupl
         remedy = "name the columns of the file in the mapping, or write their names above the numbers"
         raise _failed(path, what, remedy, 1)
     return best[1:]
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
-    except (csv.Error, StopIteration):
-        return [line]
-
-
-def _bare(cell: str) -> str:
-    """A unit without brackets; empty where it says that there is none."""
-    text = cell.strip("[]() ")
-    return "" if text in _NO_UNIT else text
-
-
-def _heading(cell: str, columns: set[str]) -> tuple[str, str]:
-    """Name and unit of a header's cell. A name that is wanted with its unit in it stays whole."""
-    cell = unguarded(cell.strip().strip('"').strip())
-    match = _HEADING.fullmatch(cell)
-    if match is None:
-        return cell, ""
-    unit = match["sure"] if match["sure"] is not None else match["round"] or match["last"]
-    if match["sure"] is None and unit not in GERMAN:
-        try:
-            dimensions(unit.strip())
-        except UnitError:
-            return cell, ""
-    return cell if cell in columns else match["name"] or match["before"] or "", _bare(unit)
-
-
-def _words(cells: Sequence[str]) -> bool:
-    """Whether there is no number and no time in a row, and at least one unit or more words than one."""
-    texts = [text for cell in cells if (text := cell.strip("[]() ")) and text != "1"]
-    if any(not np.isnan(_number(text.replace(",", "."))) or _TIME.fullmatch(text) for text in texts):
-        return False
-    return any(re.search(r"[^\W\d_]|[°%‰]", text) and text.casefold() not in NOTHING for text in texts)
 
 
 # ---- Parquet, TDMS and NetCDF ---------------------------------------------------------------------------------
@@ -386,7 +329,7 @@ def _read_netcdf(path: Path, names: Sequence[str], optional: Sequence[str]) -> D
                            for name, size in sizes.items())  # fmt: skip
                 what = f"its variables are not all of one dimension, the same for all: {', '.join(of_each)}"
                 raise _failed(path, what, "write each column as a variable of that dimension alone")
-            columns = {name: _column(chosen[name].values, _bare(str(chosen[name].attrs.get("units", ""))))
+            columns = {name: _column(chosen[name].values, bare(str(chosen[name].attrs.get("units", ""))))
                        for name in places}  # fmt: skip
     except MechanismError:
         raise

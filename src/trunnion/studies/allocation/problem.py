@@ -296,8 +296,6 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
         what += f"is {effects.say(row, over)}{places[row]}"
         if problem.criterion == "yield":
             what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
-        count, beyond = (len(set(places[(labels == label) & which].tolist())) for which in (used >= 0, broken))
-        what += f"; {beyond} of {count} positions exceed their limits" * (count > 1)
         remedy, figures = f"widen the limit, or first {narrow} has the largest share", {"limit": limit, "takes": over}
         where = label or f"row {row + 1}"
         findings.append(Finding.error("allocation.impossible", where, what, remedy, **figures, largest=largest.name))

@@ -1,17 +1,17 @@
 """The rows of an allocation from first order of a mechanism: every position of every measure with limits.
 
-A figure that is a deviation from the nominal mechanism has a row at each position, any other figure one row. What moves
-a row is linear in the half widths, and so is what a play does in its radius, with a few exceptions: which way a point
-is off most, which two positions a peak-to-peak deviation lies between, a distribution whose shape changes with its
-limits. These are taken as they are with the tolerances of the study, and again with those that are found, see
-`allocate`.
+A figure that is a deviation from the nominal mechanism has a row at each position, and at the worst place between them,
+any other figure one row. What moves a row is linear in the half widths, and so is what a play does in its radius, with
+a few exceptions: where a course is worst, which way a point is off most, which two positions a peak-to-peak deviation
+lies between, a distribution whose shape changes with its limits. These are taken as they are with the tolerances of the
+study, and again with those that are found, see `allocate`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
+from itertools import chain, compress
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from trunnion.cycle.scales import scales_of
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
-from trunnion.studies.allocation.problem import Criterion, RowEffects
+from trunnion.studies.allocation.problem import AllocationProblem, Criterion, RowEffects
+from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.linear import Of, against, by_position, limits
+from trunnion.studies.tolerance.linear import Of, against, by_position, limits, worst_place
 
 __all__ = ["Rows", "rows_of"]
 
@@ -34,7 +35,7 @@ TEXTS = ("labels", "places", "units")
 
 @dataclass(frozen=True)
 class Rows:
-    """Effects with what their rows are: measure and position by number, −1 where a figure is of no one position.
+    """Effects with what their rows are: measure and position by number, −1 where a figure is of no position of these.
 
     moving: rows whose effects depend on the tolerances themselves; unknown: measures of which first order has no row.
     """
@@ -45,18 +46,26 @@ class Rows:
     moving: NDArray[np.bool_]
     unknown: tuple[str, ...] = ()
 
+    def picked(self, which: NDArray[np.bool_]) -> Rows:
+        """Some of the rows."""
+        columns: dict[str, Any] = {key: getattr(self.effects, key)[which] for key in NUMBERS}
+        columns |= {key: tuple(compress(getattr(self.effects, key), which)) for key in TEXTS}
+        return Rows(replace(self.effects, **columns), self.measure[which], self.position[which], self.moving[which])
+
     def with_moving(self, other: Rows) -> Rows:
         """These rows, and those of others that move."""
-        first, more, which = self.effects, other.effects, other.moving
-        columns: dict[str, Any] = {
-            key: np.concatenate([getattr(first, key), getattr(more, key)[which]]) for key in NUMBERS
-        }
-        columns |= {key: getattr(first, key) + tuple(compress(getattr(more, key), which)) for key in TEXTS}
-        measure, position, moving = (
-            np.concatenate([getattr(self, key), getattr(other, key)[which]])
-            for key in ("measure", "position", "moving")
-        )
-        return Rows(replace(first, **columns), measure, position, moving, self.unknown)
+        return replace(_joined([self, other.picked(other.moving)]), unknown=self.unknown)
+
+
+def _joined(parts: Sequence[Rows]) -> Rows:
+    """All rows of several."""
+    effects = [part.effects for part in parts]
+    columns: dict[str, Any] = {key: np.concatenate([getattr(each, key) for each in effects]) for key in NUMBERS}
+    columns |= {key: tuple(chain(*(getattr(each, key) for each in effects))) for key in TEXTS}
+    measure, position, moving = (
+        np.concatenate([getattr(part, key) for part in parts]) for key in ("measure", "position", "moving")
+    )
+    return Rows(replace(effects[0], **columns), measure, position, moving)
 
 
 def rows_of(
@@ -67,43 +76,57 @@ def rows_of(
     Effects of these are per unit of half width, of all others those of the whole tolerance (their half width being 1).
     tight: what the limits of a measure are multiplied by.
     """
-    names, system, values = study.inputs.names, study.run.system, study.run.values
-    slopes, spreads, ends = [np.zeros((len(names), 0))], [np.zeros((5, len(names), 0))], [np.zeros((2, 0))]
-    measure, position, moving, unknown = list[int](), list[int](), list[bool](), list[str]()
-    for k, of in enumerate(study.linear.measures):
-        if not np.any(np.isfinite(limits(of))):
-            continue
-        first, index, moves = (of.course, of.reference.window.index, of.measure.kind == "path_error")
-        if not _everywhere(of):
-            first, moves = of.figure, by_position(of.reference)
-            index = np.array([index[of.place] if of.place >= 0 else -1])
-        spread = np.array(first.spread).reshape(5, len(names), -1)
-        finite = np.all(np.isfinite(spread[1]), axis=0)
-        count = int(np.sum(finite))
-        if not count:
-            unknown.append(of.measure.name)
-        floor = scales_of(study.run).floor(of.measure.figure_unit(system, values))
-        size = np.abs(spread[2])
-        still = (size > 0) & (size <= floor)  # a slope of rounding would bound a tolerance at kilometres
-        slopes.append(np.where(still, 0.0, first.sensitivity.reshape(len(names), -1))[:, finite])
-        spreads.append(np.where(still, 0.0, spread)[..., finite])
-        ends.append(np.repeat(tight.get(of.measure.name, 1.0) * np.array([limits(of)]).T, count, axis=1))
-        measure, position, moving = measure + count * [k], position + index[finite].tolist(), moving + count * [moves]
+    measures = study.linear.measures
+    ends = [tight.get(of.measure.name, 1.0) * np.array(limits(of)) for of in measures]
+    rows = _joined([_of_measure(study, bought, criterion, k, ends[k]) for k in range(len(measures))])
+    limited = [k for k in range(len(measures)) if np.any(np.isfinite(ends[k]))]
+    unknown = tuple(measures[k].measure.name for k in limited if k not in rows.measure)
+    correlation = _correlation(study) if criterion == "yield" and study.effects.correlated else None
+    return replace(rows, effects=replace(rows.effects, correlation=correlation), unknown=unknown)
 
-    effects = _effects(study, bought, criterion, np.concatenate(slopes, axis=1), np.concatenate(spreads, axis=2))
-    lower, upper = np.concatenate(ends, axis=1)
-    dial, several = system.dial(values, study.plan.times), len(study.plan.times) > 1 and study.run.cycle.duration > 0
-    measures = [study.linear.measures[k].measure for k in measure]
-    effects = replace(
-        effects,
-        lower=lower,
-        upper=upper,
-        correlation=_correlation(study) if criterion == "yield" and study.effects.correlated else None,
-        labels=tuple(f"measures.{each.name}" for each in measures),
-        places=tuple(f" at {dial.at(place)}" if several and place >= 0 else "" for place in position),
-        units=tuple(each.figure_unit(system, values) for each in measures),
-    )
-    return Rows(effects, np.array(measure, int), np.array(position, int), np.array(moving, bool), tuple(unknown))
+
+def _of_measure(study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, k: int, ends: Array) -> Rows:
+    """The rows of one measure, none if it has no limits. ends: of its deviation, (end,).
+
+    A course has a row at every position, and one at the place between them where most of the room is taken: limits are
+    kept over the whole cycle, whatever the steps.
+    """
+    of, system, values = study.linear.measures[k], study.run.system, study.run.values
+    window, limited = of.reference.window, bool(np.any(np.isfinite(ends)))
+    halves = np.array([bought.get(name, 1.0) for name in study.inputs.names])
+    unit = of.measure.figure_unit(system, values)
+    floor = scales_of(study.run).floor(unit)
+
+    def effects_of(first: FirstOrder) -> RowEffects:
+        effects = _effects(study, bought, criterion, first, floor)
+        lower, upper = np.repeat(ends[:, None], len(effects.worst), axis=1)
+        return replace(effects, lower=lower, upper=upper)
+
+    def rows(first: FirstOrder, time: Array, position: NDArray[np.intp], moves: bool) -> Rows:
+        count, several = len(time), len(study.plan.times) > 1 and study.run.cycle.duration > 0
+        dial = system.dial(values, np.append(time, study.plan.times))
+        effects = replace(
+            effects_of(first),
+            labels=(f"measures.{of.measure.name}",) * count,
+            places=tuple(f" at {dial.at(i)}" if several and np.isfinite(time[i]) else "" for i in range(count)),
+            units=(unit,) * count,
+        )
+        finite = limited & np.all(np.isfinite(effects.spread()), axis=1)
+        return Rows(effects, np.full(count, k), position, np.full(count, moves)).picked(finite)
+
+    if not _everywhere(of):
+        time, position = (of.time, window.index[of.place]) if of.place >= 0 else (np.nan, -1)
+        return rows(of.figure, np.array([time]), np.array([position]), by_position(of.reference))
+    course = rows(of.course, window.time, window.index, of.measure.kind == "path_error")
+    if not limited or len(window.time) == 1:
+        return course
+
+    def used(first: FirstOrder) -> Array:
+        return AllocationProblem((), effects_of(first), criterion).used(halves)
+
+    time, slope = worst_place(study.kernel, study.effects.values(), study.effects, of.reference, study.many, used)
+    between = rows(FirstOrder(study.effects, slope), np.array([time]), np.array([-1]), True)
+    return _joined([course, between])
 
 
 def _everywhere(of: Of) -> bool:
@@ -115,10 +138,14 @@ def _everywhere(of: Of) -> bool:
 
 
 def _effects(
-    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, slopes: Array, spreads: Array
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, first: FirstOrder, floor: float
 ) -> RowEffects:
-    """Effects (row, contribution) without their limits, from what is (parameter, row)."""
-    lower, upper, half, shift, deviation = spreads
+    """Effects (row, contribution) without their limits. floor: what is rounding of the measure."""
+    count = len(study.inputs.names)
+    spread = np.array(first.spread).reshape(5, count, -1)
+    still = (spread[2] > 0) & (spread[2] <= floor)  # a slope of rounding would bound a tolerance at kilometres
+    slopes = np.where(still, 0.0, first.sensitivity.reshape(count, -1))
+    lower, upper, half, shift, deviation = np.where(still, 0.0, spread)
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
         if study.effects.is_zone(i):

@@ -8,7 +8,7 @@ the direction of the largest scatter, of a peak-to-peak deviation between the tw
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,7 @@ __all__ = [
     "linear",
     "references",
     "searched",
+    "worst_place",
 ]
 
 Array = NDArray[np.float64]
@@ -132,7 +133,7 @@ def linear(
         reference, read = nominal[measure.name], reads.get(measure.name)
         place = None
         if by_position(reference):
-            place = _placed(replace(kernel, measures=[measure]), effects, values, reference, many)
+            place = worst_place(kernel, values, effects, reference, many, lambda course: course.total.worst)
         orders.append(_of(reference, effects, courses[measure.name], read, place))
     return Linear(effects, orders, status[0])
 
@@ -279,23 +280,26 @@ def _scalar(reference: Reference, effects: Effects, parts: Sequence[Dual], line:
     return real, parts[0].dual
 
 
-def _placed(
-    kernel: NumpyKernel, effects: Effects, values: Mapping[str, Number], reference: Reference, many: Many
-) -> tuple[float, Array]:
-    """Time, s, at which the worst case of a course is largest, and the derivatives of the figure there, (row,).
+def worst_place(
+    kernel: NumpyKernel, values: Mapping[str, Number], effects: Effects, reference: Reference, many: Many,
+    size: Callable[[FirstOrder], Array],
+) -> tuple[float, Array]:  # fmt: skip
+    """Time, s, at which a course is worst, whatever the steps, and the derivatives of the measure there, (row,).
 
-    NaN s of a peak-to-peak value, which is of two places.
+    NaN s of a peak-to-peak deviation, which is of two places. kernel: of all measures; values: of the rows of the
+    effects; size: how bad a course is, (position,).
     """
     run, measure, time = kernel.run, reference.measure, many.spots(reference.measure)
+    kernel = replace(kernel, measures=[measure])
     for _ in range(ROUNDS):
         curves, status = kernel.courses(values, moved(run, values, within(run, time)))
         parts = [Dual(*effects.slopes(part, (len(time),))) for part in curves[measure.name]]
         course = FirstOrder(effects, effects.without_noise(_scalar(reference, effects, parts)[1]))
-        if measure.rule == "peak-to-peak":
+        if measure.rule == "peak-to-peak" and by_position(reference):
             return float("nan"), _widest(course)
         sound = np.broadcast_to(status, (len(effects.rows), len(time)))[0] < Status.NEAR_SINGULAR
-        size = np.nan_to_num(course.total.worst) * (sound | ~np.any(sound))  # first order says little at a dead centre
-        top = int(np.argmax(size))
+        sizes = np.nan_to_num(size(course)) * (sound | ~np.any(sound))  # first order says little at a dead centre
+        top = int(np.argmax(sizes))
         place, steep = float(time[top]), course.slope[:, top]
         if len(time) == 1:
             break

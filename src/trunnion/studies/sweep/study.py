@@ -167,7 +167,7 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
 
 def _undefined(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
     """Points with an answer that have no efficiency, and measures of a motion in time that have no value there."""
-    undefined = (arrays["without_answer"] == 0) & np.isnan(arrays["efficiency"])
+    undefined = (arrays["status"] < Status.NOT_CONVERGED) & np.isnan(arrays["efficiency"])
     if np.any(undefined):
         of, first, figures = _places(points.swept, undefined)
         why, remedy = "the drivers supply no net work", "see the mean powers there"

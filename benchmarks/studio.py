@@ -118,7 +118,8 @@ IDLE = """async () => {
 LOOK = """async (name) => {
   const { module_studio_motion: { crank }, module_studio_sheet: { sheet } } = await import("/modules.js");
   crank.go(40); // at 0 the chain is near to where it cannot be assembled
-  const [handle, window] = [document.querySelector(`.handle[data-name="${name}"]`), sheet.view.root].map((one) => one.getBoundingClientRect());
+  const handle = document.querySelector(`.handle[data-name="${name}"]`).getBoundingClientRect();
+  const window = sheet.view.root.getBoundingClientRect();
   sheet.zoom(8, [handle.x + handle.width / 2 - window.x, handle.y + handle.height / 2 - window.y]);
 }"""
 

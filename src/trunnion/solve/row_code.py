@@ -151,7 +151,7 @@ class RowCode:
         self._leaves = {name: leaves_of(nest) for name, nest in placed.items()}
         self._makers = {name: _maker(nest) for name, nest in placed.items()}
         in_table = range(len(places))
-        forces = [self._leaves[name] for name in ("reactions", "friction", "efforts")]
+        forces = [self._leaves[name] for name in ("reactions", "friction", "losses", "efforts")]
         self._forces = [row for rows in forces for row in rows if row in in_table]
         frames = leaves_of([motion.frame for motion in back.walk.motions.values()])
         self._frames = [places[leaf.node] for leaf in frames if isinstance(leaf, Recorded)]
@@ -166,6 +166,7 @@ class RowCode:
         doubtful |= ~np.isfinite(np.sum(table[self._forces], axis=0)) | np.any(table[self._doubts] != 0.0, axis=0)
         assembled = np.isfinite(np.sum(table[self._frames], axis=0))
         doubtful &= assembled  # elsewhere there are no forces to be found
+        table[np.ix_(self._forces, ~assembled)] = np.nan
         if doubtful.all():
             return None
         entries = _Entries(self._makers, table, self._truths, self._same)

@@ -23,6 +23,7 @@ TEXTS = {
     "chain": chain(13),
     **{name: (EXAMPLES / f"{name}.yaml").read_text("utf-8") for name in ("jansen", "drawing-press", "scotch-yoke")},
     "locked": (EXAMPLES / "drawing-press.yaml").read_text("utf-8").replace("friction: 0.1", "friction: 0.4"),
+    "broken": chain(13).replace("d: 150 mm", "d: 146 mm"),
     "cardan": (EXAMPLES / "pezzuti-cardan.yaml").read_text("utf-8"),
 }
 

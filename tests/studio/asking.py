@@ -93,8 +93,9 @@ def unpacked(answer: bytes) -> dict[str, Any]:
             return [float(one) if np.isfinite(one) else None for one in numbers]
         if "grid" in value:
             (first, count), names = value["grid"], value["names"]
-            starts = iter(range(first, first + count * len(names) * len(value["keys"]), count))
-            return {key: {name: whole({"column": [next(starts), count]}) for name in names} for key in value["keys"]}
+            starts = iter(range(first, first + count * len(names or "1") * len(value["keys"]), count))
+            column = lambda: whole({"column": [next(starts), count]})  # noqa: E731
+            return {key: {name: column() for name in names} if names else column() for key in value["keys"]}
         return {key: whole(one) for key, one in value.items()}
 
     found: dict[str, Any] = whole(header)

@@ -244,7 +244,7 @@ def test_a_slider_changes_the_mechanism_as_it_is_pulled_and_the_file_as_it_is_re
     for step in range(8):
         user.page.mouse.move(box["x"] + (0.5 - 0.005 * step) * box["width"], box["y"] + 0.5 * box["height"])
         user.page.wait_for_timeout(40)
-    user.until("s.live.value?.joints.B.reaction.x.length === 360")
+    user.until("s.live.value?.joints.B.x.length === 360")
     assert user.state("s.text.value") == text
     live = torque.text_content()
     assert live != before

@@ -153,10 +153,12 @@ class RowCode:
         self._leaves = {name: leaves_of(nest) for name, nest in placed.items()}
         self._makers = {name: _maker(nest) for name, nest in placed.items()}
         in_table = range(len(places))
-        forces = [self._leaves[name] for name in ("reactions", "friction", "efforts")]
+        forces = [self._leaves[name] for name in ("reactions", "friction", "losses", "efforts")]
         self._forces = [row for rows in forces for row in rows if row in in_table]
-        self._frames = [row for row in self._leaves["motions"] if row in in_table]
-        self._last = max([*self._frames, *self._conditions, *self._doubts], default=0)
+        frames = leaves_of([motion.frame for motion in back.walk.motions.values()])
+        self._frames = [places[leaf.node] for leaf in frames if isinstance(leaf, Recorded)]
+        moved = [row for row in self._leaves["motions"] if row in in_table]
+        self._last = max([*moved, *self._conditions, *self._doubts], default=0)
 
     def solved(self, system: System, values: Values, time: Array) -> Any:
         """Motion and forces at some times, s, a `Backward`; None where NumPy is to find all of them."""
@@ -164,6 +166,9 @@ class RowCode:
         condition = np.max(table[self._conditions], axis=0, initial=1.0)
         doubtful = ~(condition <= BORDER) | np.any(table[self._certain] == 0.0, axis=0)
         doubtful |= ~np.isfinite(np.sum(table[self._forces], axis=0)) | np.any(table[self._doubts] != 0.0, axis=0)
+        assembled = np.isfinite(np.sum(table[self._frames], axis=0))
+        doubtful &= assembled  # elsewhere there are no forces to be found
+        table[np.ix_(self._forces, ~assembled)] = np.nan
         if doubtful.all():
             return None
         entries = _Entries(self._makers, table, self._truths, self._same)
@@ -171,7 +176,7 @@ class RowCode:
         walk = self._walked(system, values, time, entries)
         filled = self._kind.__new__(self._kind)
         filled.__dict__ |= {"_entries": entries, "walk": walk, "travels": False, "margin": None}
-        both: list[tuple[Any, Any]] = [(walk, {"condition": condition, "assembled": ~doubtful}), (filled, {})]
+        both: list[tuple[Any, Any]] = [(walk, {"condition": condition, "assembled": assembled}), (filled, {})]
         both[1][1].update(converged=~doubtful, share=np.where(doubtful, 0.0, 1.0), bound=bound)
         if doubtful.any():
             lanes = np.flatnonzero(doubtful)

@@ -241,10 +241,7 @@ def _drag(question: Asked) -> dict[str, Any]:
     changes = {change.path: change for change in sketch.moved(point, to, bool(question.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
     live = Live(question.run, values, question.steps)
-    far = np.hypot(*(live.tracks[".".join(held(sketch, point))] - np.array(to)[:, None]))
-    near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
-    if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
-        near = index
+    near = live.nearest(*held(sketch, point), to, index, 1e-6 * sketch.size)
     rows = []
     for path, value in values.items():
         section, name, *inner = path.split(".")
@@ -267,10 +264,11 @@ def _live(question: Asked, values: Mapping[str, float], index: int, live: Live |
         columns = live_in_space(question.run, values, question.steps, index)
     else:
         columns = (live or Live(question.run, values, question.steps)).told(index)
-    status = columns["status"]
-    if status[index] == Status.LOCKED:
+    at = index if len(columns["status"]) > 1 else 0
+    status = np.array(columns["status"][at : at + 1])
+    if status[0] == Status.LOCKED:
         numbers = run.system.mechanism.parameters(values)
-        locked = locks_of(run, run.cycle.times(len(status))[[index]], status[index : index + 1], numbers)
+        locked = locks_of(run, run.cycle.times(question.steps)[[index]], status, numbers)
     locks = {joint: float(column[0]) for joint, column in locked.items()}
     return {"solved": True, "index": index, **columns, "locks": locks}
 

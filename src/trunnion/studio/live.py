@@ -7,10 +7,10 @@ joints the forces are those of the position that is shown: those of a whole cycl
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,11 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.status import status_of
 from trunnion.solve.system import Values
 from trunnion.studio.loaded import Asked
 from trunnion.studio.placed import tracked
+from trunnion.studio.sketch import Vector
 
 __all__ = ["Live", "live_columns", "live_in_space", "places_at", "uncollected"]
 
@@ -33,7 +34,6 @@ Array = NDArray[np.float64]
 
 AT_ONCE = 12_000  # joints times positions whose forces are worked out in the time of a picture
 MOST_TRACKED = 6_000  # places of all tracks that are drawn in it: the page writes each as text
-STILL = 1e-9  # of the size: a point that moves less has no track
 MOST_FOLLOWED = 16  # contacts whose friction is followed until they lock: the time grows with their cube
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
 
@@ -92,23 +92,30 @@ class Live:
         """All numbers, the replaced ones among them."""
         return self.run.system.mechanism.parameters(self.values) if self.values else self.run.values
 
-    @cached_property
-    def _cycle(self) -> Backward | None:
-        """Motion and forces of all positions, None of many joints."""
-        few = len(self.run.system.joints) * self.steps <= AT_ONCE
-        return self.run.solve(self.time, self.numbers) if few else None
+    @property
+    def few(self) -> bool:
+        """Whether all positions are solved in the time of a picture; else the shown one alone is."""
+        return len(self.run.system.joints) * self.steps <= AT_ONCE
 
-    @cached_property
+    @lru_cache(maxsize=2)  # noqa: B019  # it lives as long as an answer is made
+    def _solved(self, index: int) -> Backward:
+        """Motion and forces of all positions, of many joints those of one position."""
+        if self.few and index:
+            return self._solved(0)
+        return self.run.solve(self.time if self.few else self.time[[index]], self.numbers)
+
     @np.errstate(all="ignore")
-    def walk(self) -> Forward:
-        """Its motion over the cycle; of many joints the places alone."""
-        cycle = self._cycle
-        return cycle.walk if cycle else self.run.posed(self.time, self.numbers)
-
-    @cached_property
-    def tracks(self) -> dict[str, Array]:
-        """Where every point "link.point" goes, (2, position), m."""
-        return _places(self.walk, self.steps)
+    def nearest(self, link: str, point: str, to: Vector, index: int, slack: float) -> int:
+        """Position at which a point of a link is nearest to a place, m: `index` unless another is nearer by `slack`."""
+        far = _far(self._solved(index).walk, link, point, to)
+        if len(far) < self.steps:
+            if far[0] <= slack:
+                return index
+            far = _far(self.run.posed(self.time, self.numbers), link, point, to)
+        if not np.any(np.isfinite(far)):
+            return index
+        near = int(np.nanargmin(far))
+        return index if far[index] <= far[near] + slack else near
 
     @np.errstate(all="ignore")
     def told(self, index: int) -> dict[str, Any]:
@@ -118,30 +125,25 @@ class Live:
         -------
         dict
             The columns of `live_columns`, of all positions or of the shown one alone; then with `tracks`, thinned, of
-            what moves. status: of all positions; margin: the locking margin at the shown one, `value` None where it has
-            none, and whether it is `beyond` that.
+            what moves. margin: the locking margin at the shown one, `value` None where it has none, and whether it is
+            `beyond` that.
         """
-        back = self._cycle
-        if back is None:
-            back = self.run.solve(self.time[[index]], self.numbers)
-            columns = live_columns(back, 1)
-            status = pose_status(self.walk, (self.steps,))
-            status[index] = columns["status"][0]
-            columns |= {"tracks": self._drawn(), "status": [int(code) for code in status]}
-            return columns | {"margin": _margin(self.run, self.numbers, back, columns["status"], index, np.True_)}
-        columns, lanes = live_columns(back, self.steps), np.arange(self.steps) == index
-        return columns | {"margin": _margin(self.run, self.numbers, back, columns["status"], index, lanes)}
+        back, lanes = self._solved(index), np.arange(self.steps) == index
+        columns = live_columns(back, self.steps if self.few else 1)
+        status = columns["status"]
+        if not self.few:
+            columns["tracks"], lanes = self._tracks(), np.True_
+        here = status[index if self.few else 0]
+        return columns | {"margin": _margin(self.run, self.numbers, back, here, self.time[index], lanes)}
 
-    def _drawn(self) -> dict[str, dict[str, Array]]:
+    def _tracks(self) -> dict[str, dict[str, Array]]:
         """Where each joint and each free point goes that moves, at as many positions as can be drawn in time."""
-        system = self.run.system
-        joints = {f"{links[1]}.{name}" for name, (_, links) in system.joints.items()}
-        keys = [key for key in self.tracks if key in joints or key.partition(".")[2] not in system.joints]
-        places = np.array([self.tracks[key] for key in keys])  # (point, axis, position)
-        reach = np.fmax.reduce(np.fmax.reduce(places, axis=2) - np.fmin.reduce(places, axis=2), axis=1)
-        moving = np.flatnonzero(reach > STILL * np.fmax.reduce(reach))
-        stride = -(-len(moving) * self.steps // MOST_TRACKED)
-        return {keys[k]: dict(zip("xy", places[k, :, ::stride], strict=True)) for k in moving}
+        system, ground = self.run.system, self.run.system.mechanism.fixed_link
+        still = {name for name, (_, links) in system.joints.items() if ground in links and system.turns(name)}
+        joints = {(links[1], name) for name, (_, links) in system.joints.items() if name not in still}
+        free = {(link, name) for link, name in system.points if link != ground and name not in system.joints}
+        time = self.time[:: -(-len(joints | free) * self.steps // MOST_TRACKED)]
+        return _places(self.run.posed(time, self.numbers), len(time), joints | free)
 
 
 def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int) -> dict[str, Any]:
@@ -155,26 +157,29 @@ def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int)
         result = result_of(changed, positions(changed, steps, averaged=False, margin=False)).dataset
         back = changed.solve(changed.cycle.times(steps)[[index]])
         status = [int(code) for code in result["status"].values]
-        margin = _margin(changed, changed.values, back, status, index, np.True_)
+        here, time = status[index], float(changed.cycle.times(steps)[index])
+        margin = _margin(changed, changed.values, back, here, time, np.True_)
     return {"scene": scene(result, max_positions=steps), "status": status, "margin": margin}
 
 
 @np.errstate(all="ignore")
-def _margin(run: Run, numbers: Values, back: Backward, status: Sequence[int], index: int, lanes: Any) -> dict[str, Any]:
+def _margin(run: Run, numbers: Values, back: Backward, status: int, time: float, lanes: Any) -> dict[str, Any]:
     """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position.
 
     Of many contacts it is a multiple that the margin is more than.
     """
+    if status > Status.LOCKED:
+        return {"value": None, "beyond": False}
     many = sum(map(len, back.rubbed)) > MOST_FOLLOWED
-    time = run.cycle.times(len(status))[[index]]
-    if status[index] == Status.ZERO_SLIP and run.cycle.duration > 0:
+    if status == Status.ZERO_SLIP and run.cycle.duration > 0:
         figure = partial(margin_for_sure if many else margin_in, most=NEAR)
-        margin = float(least_beside(figure, lambda at: run.solve(at, numbers), time, run.cycle)[0])
+        beside = least_beside(figure, lambda at: run.solve(at, numbers), np.array([time]), run.cycle)
+        margin = float(beside[0])
     else:
         margins = margin_for_sure(back, NEAR) if many else margin_in(back, NEAR, lanes)
         every = np.broadcast_to(np.asarray(margins, float), np.shape(back.walk.time))
-        margin = float(every[index if np.ndim(lanes) else 0])
-    if status[index] > Status.LOCKED or np.isnan(margin):
+        margin = float(every[np.flatnonzero(lanes)[0]])
+    if np.isnan(margin):
         return {"value": None, "beyond": False}
     return {"value": min(margin, NEAR), "beyond": many or margin > NEAR}
 
@@ -192,31 +197,30 @@ def live_columns(back: Backward, steps: int) -> dict[str, Any]:
     -------
     dict
         points: x, y, m, of each "link.point"; angles: of the links, rad; status: of the positions; efforts: of the
-        drivers, N m or N; joints: the series of each that a scene of the page has: reaction, N, friction along a
-        slide, N, and friction_power, W. Forces are NaN where a position is not solved.
+        drivers, N m or N; joints: of each the reaction, x and y, N, friction_power, W, and friction along a slide, N.
+        Forces are NaN where a position is not solved.
     """
     walk, system = back.walk, back.walk.system
     status = status_of(back, (steps,))
-    numbers = {("effort", name): effort for name, effort in back.efforts.items()}
+    numbers = {("", name): effort for name, effort in back.efforts.items()}
     for name in system.joints:
         numbers |= dict(zip(((name, "x"), (name, "y")), tuple(back.reactions[name])[:2], strict=True))
-        numbers[name, "loss"], numbers[name, "friction"] = back.losses[name], back.friction[name]
+        numbers[name, "friction_power"] = back.losses[name]
+        if not system.turns(name):
+            numbers[name, "friction"] = back.friction[name]
     rows = _rows(list(numbers.values()), steps)
     rows[:, status >= Status.NOT_CONVERGED] = np.nan
-    force = dict(zip(numbers, rows, strict=True))
-    joints = {}
-    for name in system.joints:
-        reaction = {axis: force[name, axis] for axis in "xy"}
-        joints[name] = {"reaction": reaction, "friction_power": force[name, "loss"]}
-        if not system.turns(name):
-            joints[name]["friction"] = force[name, "friction"]
+    joints: dict[str, dict[str, Array]] = {name: {} for name in ("", *system.joints)}
+    for (name, part), row in zip(numbers, rows, strict=True):
+        joints[name][part] = row
+    efforts = joints.pop("")
     frames = [motion.frame for motion in walk.motions.values()]
     angles = np.arctan2(*(_rows([getattr(frame, part) for frame in frames], steps) for part in "sc"))
     return {
-        "points": {key: dict(zip("xy", place, strict=True)) for key, place in _places(walk, steps).items()},
+        "points": _places(walk, steps, walk.system.points),
         "angles": dict(zip(walk.motions, angles, strict=True)),
         "status": [int(code) for code in status],
-        "efforts": {name: force["effort", name] for name in back.efforts},
+        "efforts": efforts,
         "joints": joints,
     }
 
@@ -229,12 +233,22 @@ def _rows(numbers: Sequence[Any], steps: int) -> Array:
     return table
 
 
-def _places(walk: Forward, steps: int) -> dict[str, Array]:
-    """Where every point "link.point" is, (2, position), m."""
-    order = {link: k for k, link in enumerate(walk.motions)}
-    frames = [motion.frame for motion in walk.motions.values()]
+def _places(walk: Forward, steps: int, points: Iterable[tuple[str, str]]) -> dict[str, dict[str, Array]]:
+    """Where points (link, name) are, x and y, m, by "link.name"."""
+    points = list(points)
+    order = {link: k for k, link in enumerate(dict.fromkeys(link for link, _ in points))}
+    frames = [walk.motions[link].frame for link in order]
     x, y, c, s = (_rows([getattr(frame, part) for frame in frames], steps) for part in "xycs")
-    of = [order[link] for link, _ in walk.system.points]
-    u, v = np.array([walk.local_place(link, name) for link, name in walk.system.points], float).T[:, :, None]
+    of = [order[link] for link, _ in points]
+    u, v = np.array([walk.local_place(link, name) for link, name in points], float).reshape(-1, 2).T[:, :, None]
     places = np.stack([x[of] + c[of] * u - s[of] * v, y[of] + s[of] * u + c[of] * v], axis=1)
-    return {f"{link}.{name}": place for (link, name), place in zip(walk.system.points, places, strict=True)}
+    return {
+        f"{link}.{name}": dict(zip("xy", place, strict=True))
+        for (link, name), place in zip(points, places, strict=True)
+    }
+
+
+def _far(walk: Forward, link: str, point: str, to: Vector) -> Array:
+    """Distance of a point of a link from a place at each position, m."""
+    track = _places(walk, len(walk.time), [(link, point)])[f"{link}.{point}"]
+    return np.hypot(track["x"] - to[0], track["y"] - to[1])

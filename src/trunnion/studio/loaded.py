@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,6 +45,7 @@ class Loaded:
     mechanism: Mechanism | None
     findings: tuple[Finding, ...]
     bare: bool = False
+    _working_out: Lock = field(default_factory=Lock, repr=False)
 
     def placed(self, findings: tuple[Finding, ...]) -> list[Finding]:
         """Findings with their lines."""
@@ -86,9 +88,13 @@ class Loaded:
         with np.errstate(all="ignore"):
             return result_of(self.run if friction else self.frictionless_run, positions).dataset
 
-    @lru_cache(maxsize=2)  # noqa: B019
     def result(self, steps: int, friction: bool) -> xr.Dataset:
-        """What `analyse` gives, of the same positions."""
+        """What `analyse` gives, of the same positions; who asks while it is worked out waits for it."""
+        with self._working_out:
+            return self._result(steps, friction)
+
+    @lru_cache(maxsize=2)  # noqa: B019
+    def _result(self, steps: int, friction: bool) -> xr.Dataset:
         from trunnion.cycle.positions import over_cycle
         from trunnion.cycle.summary import result_of
 

@@ -3,8 +3,8 @@
 uint32 n (little-endian), n bytes of header (a multiple of 4), columns. In the header a column is
 `{"column": [first, count]}`, in numbers from the end of the header; NaN stands where there is none. `{"sum": [first,
 count]}` is the sum of two columns, one behind the other, which has 48 binary digits. `{"grid": [first, count], "names":
-…, "keys": …}` are columns of so many numbers for each name of each key. A file is `{"bytes": [first, count]}`, in bytes
-from there.
+…, "keys": …}` are columns of so many numbers for each name of each key, or for each key where `names` is null. A file
+is `{"bytes": [first, count]}`, in bytes from there.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ def packed(header: Mapping[str, Any]) -> bytes:
             rows = list(value.values())
             if (alike := _columns_of(rows)) is not None:
                 first, size = column(np.array(alike))["column"]
-                return {"grid": [first, size // len(alike)], "names": list(rows[0]), "keys": list(map(str, value))}
+                names = list(rows[0]) if isinstance(rows[0], dict) else None
+                return {"grid": [first, size // len(alike)], "names": names, "keys": list(map(str, value))}
             return {str(key): plain(item) for key, item in value.items()}
         if isinstance(value, np.ndarray):
             return column(value)
@@ -79,9 +80,13 @@ def packed(header: Mapping[str, Any]) -> bytes:
 
 
 def _columns_of(rows: list[Any]) -> list[np.ndarray] | None:
-    """The columns of many entries that are alike; None of others."""
-    if len(rows) < SHORTEST or not all(isinstance(row, dict) and row.keys() == rows[0].keys() for row in rows):
+    """The columns of many entries that are alike, a column each or some by name; None of others."""
+    if len(rows) < SHORTEST:
         return None
-    columns = [column for row in rows for column in row.values()]
+    columns = rows
+    if isinstance(rows[0], dict):
+        if not all(isinstance(row, dict) and row.keys() == rows[0].keys() for row in rows):
+            return None
+        columns = [column for row in rows for column in row.values()]
     alike = all(type(column) is np.ndarray and column.shape == columns[0].shape for column in columns)
     return columns if columns and alike else None

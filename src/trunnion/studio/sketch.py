@@ -124,8 +124,10 @@ class Sketch:
 
     def points(self, link: str) -> Mapping[str, Any]:
         """Points of a link, as stated."""
-        points = self.of("links").get(link, {}).get("points")
-        return points if isinstance(points, dict) else {}
+        entry: Any = self.entries
+        for key in ("links", link, "points"):  # not of `of`: that goes through all links
+            entry = entry.get(key) if isinstance(entry, dict) else None
+        return entry if isinstance(entry, dict) else {}
 
     @cached_property
     def numbers(self) -> Mapping[str, Any]:

@@ -128,7 +128,8 @@ export function perNewton({ usual, frame, factor }) {
 /** Coupler curves of free points, thin ones for moving joints, in metres. */
 export function drawTracks({ scene, layers, plain, shown }) {
   const none = scene.count === 1 || plain || shown.curves === false;
-  layers.tracks.replaceChildren(...(none ? [] : tracksOf(scene, metres)));
+  const paths = none ? [] : tracksOf(scene, metres, layers.tracks.children);
+  if (paths.length !== layers.tracks.childElementCount) layers.tracks.replaceChildren(...paths);
 }
 
 /** A place as text of a path in metres. */

@@ -133,7 +133,8 @@ function takeHold(view, held) {
   held.joint = { kind, name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
   const { joint } = held;
   joint.ask = newest((to) => changed("drag", { point: name, index: joint.index, to, keep: joint.keep }), (found, to) => follow(joint, found, to));
-  state.selection.value = { kind, name };
+  joint.chosen = { kind, name };
+  if (sketched) state.selection.value = joint.chosen;
 }
 
 /** The points that lie in one joint, of a mechanism that is only drawn yet. */
@@ -180,6 +181,7 @@ function dragTo(joint, at, scale, alt) {
   if (joint.posed) {
     state.live.value = null;
     state.index.value = index;
+    state.selection.value = joint.chosen;
     joint.base = null;
     return state.say(joint.crank ? `${joint.name} turns with the drive; with Alt it changes lengths.` : `${joint.name} is on its path: lengths stay. Off it, or with Alt, they change.`);
   }
@@ -205,6 +207,7 @@ function follow(joint, found, to) {
   joint.told = wordsOf(found);
   batch(() => {
     state.live.value = { ...found, to };
+    state.selection.value = joint.chosen; // not before: what is laid over a chosen point is asked for when nothing is dragged
     state.index.value = found.index;
     state.say(joint.told);
   });

@@ -8,27 +8,41 @@ import { gridStep } from "./geometry.js";
 
 const NOUNS = { joints: "Joint", points: "Point", centres: "Mass centre of" };
 const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
+const FEW = 60; // that are put at every picture; to move more takes longer than a picture has, and they follow
+const REST = 150; // ms after which they do
 
 /** Put targets over the spots; `chosen` {kind, name} is marked. */
 export function poseHandles(view, spots, chosen) {
-  const { layers, frame } = view;
   const few = spots.slice(0, MOST);
+  const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
+  const fresh = view.handled !== names;
+  if (fresh) build(view, few, names);
+  view.target = targets(view, few, chosen);
+  if (fresh || few.length <= FEW) return view.target();
+  if (chosen) view.target(chosen);
+  view.waits ??= setTimeout(() => ((view.waits = null), view.target()), REST);
+}
+
+/** A function that puts the targets, or that of the chosen spot alone, over their spots. */
+function targets({ layers, frame, scene, drawn }, few, chosen) {
   const least = gridStep(frame.scale) / 1000; // what a hand can tell apart: less is rounding
   const coordinate = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
-  const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
-  if (view.handled !== names) build(view, few, names);
-  const joints = few.filter(({ kind }) => kind !== "centres").map((one) => frame.to(one.at));
-  few.forEach(({ kind, name, key, at, mass }, order) => {
-    const [x, y] = frame.to((key && place(view.scene, key, view.drawn)) ?? at); // errors may be drawn larger
-    const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
-    const active = chosen?.kind === kind && chosen.name === name;
-    set(layers.handles.children[order], {
-      cx: x.toFixed(1),
-      cy: y.toFixed(1),
-      "aria-label": words,
-      class: active ? "handle chosen" : mass && joints.some((spot) => Math.hypot(spot[0] - x, spot[1] - y) < TARGET) ? "handle under" : "handle",
+  const same = (one, other) => one.kind === other?.kind && one.name === other.name;
+  return (only = null) => {
+    const joints = only ? [] : few.filter(({ kind }) => kind !== "centres").map((one) => frame.to(one.at));
+    few.forEach((one, order) => {
+      if (only && !same(one, only)) return;
+      const { kind, name, key, at, mass } = one;
+      const [x, y] = frame.to((key && place(scene, key, drawn)) ?? at); // errors may be drawn larger
+      const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
+      set(layers.handles.children[order], {
+        cx: x.toFixed(1),
+        cy: y.toFixed(1),
+        "aria-label": words,
+        class: same(one, chosen) ? "handle chosen" : mass && joints.some((spot) => Math.hypot(spot[0] - x, spot[1] - y) < TARGET) ? "handle under" : "handle",
+      });
     });
-  });
+  };
 }
 
 function build(view, spots, names) {

@@ -78,7 +78,9 @@ export function keepLayers() {
     const seated = seats && state.factor.value > 1 && Boolean(state.answer.value?.scene?.built?.seats.length);
     return Object.entries({ centres: centres || relative, circles, transmission, seats: seated }).filter(([, shown]) => shown).map(([name]) => name).join(" ");
   }); // prettier-ignore
+  const dragged = computed(() => Boolean(state.live.value)); // then none of it is drawn, and who drags would wait for it
   effect(() => {
+    if (dragged.value) return;
     const [layers, point] = [wanted.value, watched.value];
     const scene = state.solved.value ? state.answer.value.scene : null;
     untracked(() => {

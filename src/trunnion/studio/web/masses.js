@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import { angleAt, place } from "../web/data.js";
 import { stated } from "../web/format.js";
-import { svg } from "../web/dom.js";
+import { set, svg } from "../web/dom.js";
 import { changed, edit, newest, setValue } from "./actions.js";
 import { dictionary, groundOf } from "./geometry.js";
 import { sheet, shown } from "./sheet.js";
@@ -23,12 +23,11 @@ function localOf(numbers, path) {
 }
 
 /** The frame of a link at the shown position, {origin, angle}; null where it has no place. */
-function frameOf({ scene, drawn }, numbers, name) {
-  const link = scene.links.find((one) => one.name === name);
+function frameOf({ scene, drawn }, numbers, link) {
   const key = link?.points.find((one) => place(scene, one, drawn));
   if (!key) return null;
   const angle = angleAt(link.angle, drawn) ?? 0;
-  const [x, y] = turned(localOf(numbers, `links.${name}.points.${key.slice(name.length + 1)}`), angle);
+  const [x, y] = turned(localOf(numbers, `links.${link.name}.points.${key.slice(link.name.length + 1)}`), angle);
   const spot = place(scene, key, drawn);
   return { origin: [spot[0] - x, spot[1] - y], angle };
 }
@@ -48,19 +47,21 @@ export function massSpots(view) {
   };
   return heavy.flatMap((link) => {
     const { name } = link;
-    const frame = heavy.length <= CROWD || long(link) ? frameOf(view, numbers, name) : null;
+    const frame = heavy.length <= CROWD || long(link) ? frameOf(view, numbers, link) : null;
     if (!frame) return [];
     const [x, y] = turned(pulled?.link === name ? pulled.local : localOf(numbers, `links.${name}.centre`), frame.angle);
     return { kind: "centres", name, key: name, at: [frame.origin[0] + x, frame.origin[1] + y], mass: numbers[`links.${name}.mass`] };
   });
 }
 
-/** The marks: a circle with two quarters filled. */
-export function massMarks(view) {
+/** Put the marks over such spots: circles with two quarters filled. */
+export function poseMasses({ layers, frame }, spots) {
   const r = RADIUS;
-  return massSpots(view).map(({ name, at }) => {
-    const [x, y] = view.frame.to(at).map((part) => part.toFixed(1));
-    return svg("g", { class: "mass-centre", transform: `translate(${x},${y})`, "data-of": name }, svg("circle", { r }), svg("path", { d: `M0,0V${-r}A${r},${r} 0 0 1 ${r},0ZM0,0V${r}A${r},${r} 0 0 1 ${-r},0Z` }));
+  const mark = () => svg("g", { class: "mass-centre" }, svg("circle", { r }), svg("path", { d: `M0,0V${-r}A${r},${r} 0 0 1 ${r},0ZM0,0V${r}A${r},${r} 0 0 1 ${-r},0Z` }));
+  if (layers.masses.childElementCount !== spots.length) layers.masses.replaceChildren(...spots.map(mark));
+  spots.forEach(({ name, at }, order) => {
+    const [x, y] = frame.to(at).map((part) => part.toFixed(1));
+    set(layers.masses.children[order], { transform: `translate(${x},${y})`, "data-of": name });
   });
 }
 
@@ -72,7 +73,7 @@ export function chosenOf(part) {
 /** A mass centre in the hand: `to(place)` shows forces with it there, `drop()` writes it, `leave()` puts it back. */
 export function centreHeld(view, link) {
   const { numbers } = state.answer.peek();
-  const frame = frameOf(view, numbers, link);
+  const frame = frameOf(view, numbers, view.scene.links.find(({ name }) => name === link));
   const path = `links.${link}.centre`;
   const [text, index] = [state.text.peek(), state.index.peek()];
   const whole = !shown.peek()?.sketched;

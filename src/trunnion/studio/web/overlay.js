@@ -10,7 +10,6 @@ import { outline, standing } from "../web/plane.js";
 import { KEY, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
-import { massMarks } from "./masses.js";
 import { dimensionMarks } from "./measures.js";
 import { pinsInHoles } from "./seats.js";
 import { cornered, sheet, shown } from "./sheet.js";
@@ -56,7 +55,6 @@ export function poseOverlay(view) {
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(view.ideal ? nominal(view, wanted, key) : wanted.variant ? variants(view, key) : []));
-  layers.masses.replaceChildren(...massMarks(view));
   const seats = wanted.seats && view.ideal ? (told.seats ?? []) : [];
   for (const { joint, node } of view.parts.vectors) set(node, { visibility: corner || seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(

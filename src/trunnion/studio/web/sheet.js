@@ -32,8 +32,11 @@ export function changing(scene, { points, tracks, angles, efforts, joints, statu
     links: scene.links.map((link) => ({ ...link, angle: angles[link.name] ?? link.angle })),
     points: { ...scene.points, ...points },
     drivers: scene.drivers.map((one) => ({ ...one, effort: efforts[one.name] ?? one.effort })),
-    joints: scene.joints.map((one) => ({ ...one, ...joints[one.name] })),
-    status,
+    joints: scene.joints.map((one) => {
+      const { x, y, ...rest } = joints[one.name] ?? one.reaction; // it may be of the sheet before
+      return { ...one, ...rest, reaction: { x, y } };
+    }),
+    status: tracks ? scene.status.map(() => status[0]) : status, // of one position, the only one that is shown of it
   };
 }
 

@@ -79,8 +79,9 @@ function unpacked(part, floats) {
   }
   if (keys[0] === "grid") {
     let [first, count] = part.grid;
-    const column = () => Array.from(floats.subarray(first, (first += count)), (value) => (Number.isFinite(value) ? value : null));
-    return Object.fromEntries(part.keys.map((key) => [key, Object.fromEntries(part.names.map((name) => [name, column()]))]));
+    const number = (value) => (Number.isFinite(value) ? value : null);
+    const column = () => (count === 1 ? [number(floats[first++])] : Array.from(floats.subarray(first, (first += count)), number));
+    return Object.fromEntries(part.keys.map((key) => [key, part.names ? Object.fromEntries(part.names.map((name) => [name, column()])) : column()]));
   }
   return Object.fromEntries(keys.map((key) => [key, unpacked(part[key], floats)]));
 }

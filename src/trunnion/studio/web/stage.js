@@ -9,7 +9,7 @@ import { laid } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
 import { compared } from "./variants.js";
 import { boxTo, groupMarks } from "./group.js";
-import { massSpots } from "./masses.js";
+import { massSpots, poseMasses } from "./masses.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { drawn, kindsOf, sheet, shown } from "./sheet.js";
@@ -104,7 +104,9 @@ function show(view) {
 
 function chosen(view) {
   if (!view.scene) return;
-  poseHandles(view, [...sheet.spots(), ...massSpots(view)], state.selection.value);
+  const masses = massSpots(view);
+  poseMasses(view, masses);
+  poseHandles(view, [...sheet.spots(), ...masses], state.selection.value);
   markChosen(view, state.selection.value);
   poseGhosts(view, state.live.value ? [] : others.value);
   poseOverlay(view);

@@ -46,9 +46,8 @@ export function magnitude(vector, count) {
 
 /** Sum of several series, for every position; null where any of them is. */
 export function total(list, count) {
-  return Array.from({ length: count }, (_, index) =>
-    list.reduce((sum, series) => (sum === null || at(series, index) === null ? null : sum + at(series, index)), 0),
-  );
+  const sum = (index) => list.reduce((all, series) => (all === null || at(series, index) === null ? null : all + at(series, index)), 0);
+  return list.every((series) => series?.length === 1) ? Array(count).fill(sum(0)) : Array.from({ length: count }, (_, index) => sum(index));
 }
 
 /** Greatest magnitude in any of the series, 0 if there is none. */

@@ -110,11 +110,11 @@ export function trackPath(scene, key, write) {
   return path;
 }
 
-/** The paths of moving points: coupler curves of named points, thin ones of joints. */
-export function tracksOf(scene, write) {
+/** The paths of moving points: coupler curves of named points, thin ones of joints. `nodes` are used again, in order. */
+export function tracksOf(scene, write, nodes = []) {
   const keys = scene.links.filter((one) => !one.ground).flatMap((link) => link.points.map((key) => [key, link.free.includes(key)]));
   const moving = keys.filter(([key]) => lengthOf(trackOf(scene, key)) > 1);
-  return moving.map(([key, free]) => svg("path", { class: free ? "track free" : "track", d: trackPath(scene, key, write) }));
+  return moving.map(([key, free], order) => set(nodes[order] ?? svg("path"), { class: free ? "track free" : "track", d: trackPath(scene, key, write) }));
 }
 
 // ---- ground ---------------------------------------------------------------------------------------------------------

@@ -236,27 +236,21 @@ def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
 
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-# the height of the ram by the crank angle, and by name
+# the height of the ram by the crank angle, and by the motion of its joint and its point
 HEIGHTS = {
     "drive": "(0.035 m * cos(drive) + sqrt((0.12 m)^2 - (0.035 m * sin(drive))^2))", "slide": "S.slide",
-    "point": "piston.Q.x", "named slide": "way", "named point": "height",
+    "point": "piston.Q.x",
     "distance": "hypot(rod.Q.x - frame.O.x, rod.Q.y - frame.O.y)",
-}  # fmt: skip
-NAMED = {
-    "measures": {
-        "way": {"slide": "S"}, "height": {"point": "piston.Q", "axis": "x"},
-        "pace": {"rate": "S"}, "rise": {"velocity": "piston.Q", "axis": "x"},
-    }
 }  # fmt: skip
 PRESS = "-30 N - 4000 N/m * ({0} - 0.11 m) - 500 N/m * abs({0} - 0.13 m) - 100 N * between({0}, 0.1 m, 0.12 m)"
 
 
 def pressed(force: str, **more: Any) -> Mechanism:
-    return slider_crank(0.1, loads={"work": {"link": "piston", "at": "Q", "force": [force, 0]}}, **NAMED, **more)
+    return slider_crank(0.1, loads={"work": {"link": "piston", "at": "Q", "force": [force, 0]}}, **more)
 
 
 @pytest.mark.spread(1)
-@pytest.mark.parametrize("name", ["slide", "distance", "named point"])
+@pytest.mark.parametrize("name", ["slide", "distance", "point"])
 def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
     """It equals the same force stated over the crank angle, at every position and in the means."""
     one, other = (analyse(pressed(PRESS.format(HEIGHTS[key])), 90) for key in (name, "drive"))

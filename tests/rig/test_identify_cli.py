@@ -112,7 +112,7 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
 
 @pytest.mark.slow
 def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
-    kind = "correlation"
+    kind = "intervals"
     pair = ",".join(f"{name}.friction.pair_factor" for name in ("input", "pin-1", "pin-2", "output"))
     status, text = call("--parameter", f"mu={FRICTION}", "--parameter", f"pair={pair}", "--kind", kind, "--out",
                         f"{kind}.png", "--write", "none.yaml")  # fmt: skip

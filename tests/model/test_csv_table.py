@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from trunnion import Mechanism, MechanismError
+from trunnion import Mechanism, MechanismError, Status
 from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS
 from trunnion.model.mechanism import read_mechanism
 from trunnion.model.rewrite import rewrite_mechanism
@@ -92,6 +92,7 @@ BAD = [
     ("time, angle\n0,0\n", ["points.csv:2: error: has 1 row of numbers, a table needs two"]),
     ("0 0\n1 1\n", ["points.csv:1: error: has 1 column, a table has 2 — write time"]),
     ("0,0,1,5\n1,0,2,5\n", ["points.csv:1: error: has 4 columns, a table has 2 — write time or drive coordinate"]),
+    ("t [-Infinity];q\n0;0\n1;1\n", ["points.csv:1: error: t [-Infinity]: the unit '-Infinity' is not known"]),
     ("0;0\n1;x\n", ["points.csv:2: error: 'x' is not a finite number — write a number"]),
     ("0;0\n1;nan\n2;inf\n3;1e999\n4;1_0\n", [f"points.csv:{k}: error: '{cell}' is not a finite number"
                                            for k, cell in ((2, "nan"), (3, "inf"), (4, "1e999"), (5, "1_0"))]),
@@ -115,6 +116,11 @@ def test_one_finding_for_each_problem(text: str, expected: list[str], tmp_path: 
     for line, start in zip(found, expected, strict=True):
         assert line.startswith(start), line
         assert "—" in line  # a remedy
+
+
+def test_an_angle_near_the_end_of_the_floats_has_positions_without_an_answer(tmp_path: Path) -> None:
+    found = trunnion.analyse(MODEL.with_table("O", csv(tmp_path, "0;0\n0.5;1\n0.9;1e308\n1;0\n")), 8)
+    assert (found["status"] >= Status.NOT_CONVERGED).any()
 
 
 def test_a_large_file_is_refused_quickly_with_the_limit(tmp_path: Path) -> None:

@@ -299,7 +299,10 @@ def _check_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> No
     findings = []
     for cell, text, kind in zip(cells, units, kinds, strict=True):
         try:
-            if text and not kind.accepts(dimension := Quantity.read(f"1 {text}").check({})):
+            quantity = Quantity.read(f"1 {text}")
+            if quantity.names:  # an expression such as [-Infinity]
+                raise UnitError(f"the unit '{text}' is not known")
+            if text and not kind.accepts(dimension := quantity.check({})):
                 what = f"its unit is that of {dimension_text(dimension or NUMBER)}, the column is of {kind.name}"
                 raise UnitError(what)
         except UnitError as error:

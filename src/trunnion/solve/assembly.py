@@ -142,7 +142,8 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
 
 def grid(cycle: Cycle) -> Array:
     """Times, s, at which assemblies are compared and followed."""
-    intervals = min(GRID * max(1, math.ceil(cycle.turns)), MOST_INTERVALS) if cycle.duration > 0 else 0
+    turns = math.ceil(cycle.turns) if math.isfinite(cycle.turns) else 1  # NaN of a motion near the end of the floats
+    intervals = min(GRID * max(1, turns), MOST_INTERVALS) if cycle.duration > 0 else 0
     return np.linspace(0.0, cycle.duration, intervals + 1)
 
 

@@ -116,8 +116,9 @@ def test_fewer_positions_than_unknowns(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_coverage_where_steps_repeat(tmp_path: Path) -> None:
-    """Of 150 measurements 88 % at least, of each parameter; of all parameters 90 to 99 %."""
-    every = np.array([held(identified(tmp_path, seed, 0.25)) for seed in range(150)])
+@pytest.mark.parametrize(("noise", "seeds"), [(0.25, 300), (0.1, 150)])
+def test_coverage_where_steps_repeat(tmp_path: Path, noise: float, seeds: int) -> None:
+    """Of 300 measurements 88 % at least: of a true 93 % that fails in 0.03 % of cases, of 80 % in all but 0.03 %."""
+    every = np.array([held(identified(tmp_path, seed, noise)) for seed in range(seeds)])
     assert np.all(np.mean(every, axis=0) >= 0.88), np.mean(every, axis=0)
     assert 0.9 <= np.mean(every) <= 0.99

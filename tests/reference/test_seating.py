@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from benchmarks.drawn import planar
 
 import trunnion
 from brief import brief
@@ -18,10 +19,11 @@ from mechanisms_space import cardan, closed, rssr
 from reference.maximal_space import Array, Data, Drive, Frame
 from reference.seat_oracle import FourBar, Linkage, SliderCrank
 from reference.seat_oracle_space import settle
+from trunnion.algebra.panels import ON_GRID
 from trunnion.errors import Status
 from trunnion.solve.end_loads import loads_of
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.seating import seating_of
+from trunnion.solve.seating import SETTLED, seating_of
 
 LINKAGES: dict[str, tuple[Any, type[Linkage]]] = {
     "four-bar": (four_bar, FourBar),
@@ -188,6 +190,18 @@ def test_rates_are_the_derivatives_of_the_offsets(name: str) -> None:
 
 
 @pytest.mark.slow
+def test_pins_lie_at_their_walls_between_many_bends() -> None:
+    """Seats of four pins that bend in more places than most: none is the polynomial of a panel that is too wide."""
+    run = prepare(trunnion.Mechanism(**planar.seated(90022)[1]))
+    seating = seating_of(run)
+    panels = seating.courses.states == SETTLED
+    offsets = seating.courses.on_nodes(panels)
+    between = seating.courses.coefficients[panels] @ ON_GRID
+    for end in seating.loads.ends:
+        assert np.allclose(np.linalg.norm(offsets[end.rows], axis=0), end.radius, rtol=1e-12, atol=0.0)
+        assert np.allclose(np.linalg.norm(between[:, end.rows], axis=1), end.radius, rtol=1e-9, atol=0.0)
+
+
 def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> None:
     """At 90° of the crank in closed form; a pin that its load cannot hold on its way lifts off in the same stretch."""
     crank = prepare(trunnion.Mechanism(trunnion=1, **one_crank()))

@@ -43,7 +43,7 @@ ROUNDS = 12  # most of the iteration
 EXACT = 1e-12  # change that one more round would make of a seat, of its clearance, at which it has settled
 TOLERANCE = 1e-6  # likewise, beyond which it has not, however many the rounds
 SETTLED, FLOATING, UNSETTLED, UNKNOWN = range(4)  # states of the courses
-RESOLVED = Accuracy(1e-10, 1e-10, shortest=1e-6, rounds=12)  # second derivatives of offsets lose four digits
+RESOLVED = Accuracy(1e-10, 1e-10, shortest=1e-6, rounds=12, most=256)  # second derivatives of offsets lose four digits
 IDLE = 1e-3  # of the largest load of the cycle: positions with less are like those without
 ASIDE, MOST = 0.5, 3.0  # cosine by which the travel of a pin may turn its load, and how many times it may change it
 ROUNDING = 1e-9  # of a load: one that points away from the wall, not along it but for rounding

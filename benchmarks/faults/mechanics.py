@@ -40,16 +40,16 @@ _ALGEBRA = (
 _JOINTS = (
     Fault(
         "guide-torsion-halved",
-        "joints/spatial_load.py",
+        "joints/contact_loads.py",
         "normal = normal + 2 * namespace(more[1]).abs(more[1]) / self.width",
         "normal = normal + namespace(more[1]).abs(more[1]) / self.width",
         ("tests/invariants/test_laws.py",),
     ),
     Fault(
         "guide-torsion-gradient-halved",
-        "joints/spatial_load.py",
-        "torsion = 2 * namespace(more[1]).sign(more[1]) / self.width",
-        "torsion = namespace(more[1]).sign(more[1]) / self.width",
+        "joints/contact_loads.py",
+        "else 2 * namespace(more[1]).sign(more[1]) / self.width",
+        "else namespace(more[1]).sign(more[1]) / self.width",
         ("tests/invariants/test_laws.py",),
     ),
     Fault(
@@ -68,9 +68,9 @@ _JOINTS = (
     ),
     Fault(
         "planar-guide-couple-halved",
-        "joints/pairs.py",
-        "return moment * (2 / self.length)",
-        "return moment * (1 / self.length)",
+        "joints/contact_loads.py",
+        "self.across[1], moment * (2 / self.length)",
+        "self.across[1], moment * (1 / self.length)",
         ("tests/invariants/test_laws.py",),
     ),
     Fault(

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
+from trunnion.joints.contact_loads import ContactLoad, GuideLoad, PinLoad
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PAIRS, PlanarContactLoad
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import has_guide, has_pin, motions
 
 loads = st.floats(0, 1e6)
@@ -80,8 +81,8 @@ def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
     assert not (has_pin(name) and has_guide(name))
 
 
-def load_of(turn: float | None) -> PlanarContactLoad:
-    return PlanarContactLoad() if turn is None else PlanarContactLoad((-np.sin(turn), np.cos(turn)), 0.37)
+def load_of(turn: float | None) -> ContactLoad:
+    return PinLoad() if turn is None else GuideLoad((-np.sin(turn), np.cos(turn)), 0.37)
 
 
 @given(st.one_of(st.none(), st.floats(-3, 3)), components, components, components, st.floats(0.01, 50))

@@ -16,8 +16,8 @@ import trunnion
 from mechanisms import DURANGO, eccentric_press
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.algebra.dual import derivative, primal, seed
+from trunnion.joints.contact_loads import ContactLoad, GuideLoad, PinLoad, Reaction
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PlanarContactLoad, Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.run import prepare
@@ -39,7 +39,7 @@ class Linear:
 
 
 def settled(
-    start: Array, influence: Array, contacts: Sequence[tuple[PlanarContactLoad, Any]], method: FrictionMethod
+    start: Array, influence: Array, contacts: Sequence[tuple[ContactLoad, Any]], method: FrictionMethod
 ) -> Settled:
     """Of contacts (load, coefficient), one a joint. start: (joint, 3, lane); influence: (contact, joint, 3, lane)."""
     count = len(contacts)
@@ -56,7 +56,7 @@ def settled(
         return settle(Linear([start, *influence]).reactions, [1.0] + [0.0] * count, made, method)
 
 
-def missed(found: Settled, contacts: Sequence[tuple[PlanarContactLoad, Any]]) -> Array:
+def missed(found: Settled, contacts: Sequence[tuple[ContactLoad, Any]]) -> Array:
     """Largest |friction − law| of each lane over its largest friction, from what was found alone."""
     with np.errstate(all="ignore"):
         law = [f * load.normal(reaction) for (load, f), reaction in zip(contacts, found.reactions, strict=True)]
@@ -67,7 +67,7 @@ def missed(found: Settled, contacts: Sequence[tuple[PlanarContactLoad, Any]]) ->
 def test_a_load_that_changes_ends_while_the_other_end_stays() -> None:
     """A guide pressed by F = 1 − φ/2 and by a couple of 0.97 that no friction changes: φ = f · 0.97, at once or not."""
     f = 0.49
-    guide = PlanarContactLoad((0.0, 1.0), 2.0)
+    guide = GuideLoad((0.0, 1.0), 2.0)
     start = np.array([[[0.0], [1.0], [0.97]]])
     found = settled(start, np.array([[[[0.0], [-0.5], [0.0]]]]), [(guide, f)], NEWTON)
     assert found.forces[0] == pytest.approx(f * 0.97, rel=1e-14)
@@ -76,7 +76,7 @@ def test_a_load_that_changes_ends_while_the_other_end_stays() -> None:
 
 
 @st.composite
-def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[PlanarContactLoad, Any]]]:
+def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[ContactLoad, Any]]]:
     """Up to four pins and guides, 40 lanes, friction weak to strong: some lanes have a certificate, others lock."""
     count = draw(st.integers(1, 4))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -86,7 +86,7 @@ def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[PlanarContactLoad
     influence = rng.normal(size=(count, count, 3, 40)) / count
     contacts = [
         (
-            PlanarContactLoad((0.6, 0.8), rng.uniform(0.05, 3.0, 40)) if guide else PlanarContactLoad(),
+            GuideLoad((0.6, 0.8), rng.uniform(0.05, 3.0, 40)) if guide else PinLoad(),
             strength * rng.uniform(0.05, 1.0, 40),
         )
         for guide in guides
@@ -97,7 +97,7 @@ def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[PlanarContactLoad
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(modules())
-def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[PlanarContactLoad, Any]]]) -> None:
+def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[ContactLoad, Any]]]) -> None:
     """Of both methods; where successive approximation converges and the solution is unique, both are the same."""
     start, influence, contacts = case
     newton = settled(start, influence, contacts, NEWTON)
@@ -120,7 +120,7 @@ def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
         found = settled(
             np.array([[0.0, push, np.array([1.0])]], dtype=object),
             np.array([[[0.0, np.array([-0.5]), 0.0]]], dtype=object),
-            [(PlanarContactLoad((0.0, 1.0), 2.0), 0.49)],
+            [(GuideLoad((0.0, 1.0), 2.0), 0.49)],
             NEWTON,
         )
         assert derivative(found.forces[0]) == pytest.approx(expected, rel=1e-12)

@@ -17,9 +17,8 @@ from trunnion.algebra.space import ORIGIN
 from trunnion.dynamics.active import Mode, Modes, settled
 from trunnion.dynamics.bordered import least_shares
 from trunnion.dynamics.impact_motion import OPEN, STICK, strike
+from trunnion.joints.contact_loads import BearingLoad, GuideLoad, PinLoad
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PlanarContactLoad
-from trunnion.joints.spatial_load import BearingLoad
 
 N, V = 50.0, 0.02  # N, m/s
 NUMBERS = {
@@ -106,16 +105,16 @@ def test_a_moment_across_a_bearing_is_carried_by_its_ends() -> None:
 @pytest.mark.parametrize("off", [0.0, 0.1, 0.4, 0.9])
 def test_a_guide_in_the_plane_is_loaded_at_its_two_ends(off: float) -> None:
     """A force off the middle by `off` presses on the ends, L/2 to either side, as on a beam on two supports."""
-    guide = PlanarContactLoad(across=(0.0, 1.0), length=LENGTH)
+    guide = GuideLoad(across=(0.0, 1.0), length=LENGTH)
     ends = [70.0 * (0.5 + sign * off) for sign in (1, -1)]
     assert of(guide, 11.0, 70.0, 70.0 * off * LENGTH) == pytest.approx(sum(abs(end) for end in ends))
-    moved = PlanarContactLoad(across=(0.0, 1.0), length=LENGTH, arm=(off * LENGTH, 0.02))
+    moved = GuideLoad(across=(0.0, 1.0), length=LENGTH, arm=(off * LENGTH, 0.02))
     assert of(moved, 11.0, 70.0, 70.0 * off * LENGTH - 11.0 * 0.02) == pytest.approx(70.0)
 
 
 LOADS = {
-    "pin": PlanarContactLoad(),
-    "guide in the plane": PlanarContactLoad(across=(0.6, 0.8), length=LENGTH, arm=(0.04, -0.03)),
+    "pin": PinLoad(),
+    "guide in the plane": GuideLoad(across=(0.6, 0.8), length=LENGTH, arm=(0.04, -0.03)),
     "bearing": BearingLoad(ORIGIN, LENGTH),
     "bearing, summed": BearingLoad(ORIGIN, LENGTH, True),
     "guide": BearingLoad(ORIGIN, LENGTH, width=WIDTH),
@@ -126,7 +125,7 @@ LOADS = {
 @pytest.mark.parametrize("name", LOADS)
 def test_the_gradient_of_a_normal_load_is_that_of_differences(name: str) -> None:
     load, random = LOADS[name], np.random.default_rng(3)
-    size = 3 if isinstance(load, PlanarContactLoad) else 6
+    size = 3 if isinstance(load, PinLoad | GuideLoad) else 6
     for _ in range(20):
         felt = np.array(load.felt(tuple(random.normal(size=size))), float)
         found = load.gradient(tuple(felt), load.normal(tuple(felt)))

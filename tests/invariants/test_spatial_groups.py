@@ -17,10 +17,11 @@ from trunnion.algebra.space import ORIGIN, Frame, Screw, compose, element, momen
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, Element, GroupJoint, Pose
-from trunnion.joints.spatial import MOTIONS
+from trunnion.joints import pair_motion
 
 Array = NDArray[np.float64]
 LANES = 400
+MOTIONS = pair_motion.MOTIONS["spatial"]
 LEAD = 0.013
 
 

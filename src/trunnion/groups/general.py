@@ -20,8 +20,7 @@ from trunnion.algebra.plane import Frame, Twist, Wrench, about, moment_at, place
 from trunnion.groups.gear import NUMBERS, GearPair, actions, slide_of, turn_from
 from trunnion.groups.redundant import Support
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
-from trunnion.joints.planar import MOTIONS
-from trunnion.joints.spatial import PairMotion
+from trunnion.joints.pair_motion import MOTIONS, PairMotion
 
 __all__ = ["General"]
 
@@ -38,7 +37,7 @@ class General(Tree):
 
     gears: tuple[GearPair, ...] = ()
     algebra: ClassVar[Any] = plane
-    motions: ClassVar[Mapping[str, PairMotion]] = MOTIONS
+    motions: ClassVar[Mapping[str, PairMotion]] = MOTIONS["planar"]
 
     @property
     def first(self) -> Sequence[int]:

@@ -20,7 +20,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import NULL, Screw, about, moment_at, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
-from trunnion.joints.spatial import MOTIONS, PairMotion
+from trunnion.joints.pair_motion import MOTIONS, PairMotion
 
 __all__ = ["SpatialGroup"]
 
@@ -34,7 +34,7 @@ class SpatialGroup(Tree):
 
     spinning: tuple[tuple[int, int, int], ...] = ()
     algebra: ClassVar[Any] = space
-    motions: ClassVar[Mapping[str, PairMotion]] = MOTIONS
+    motions: ClassVar[Mapping[str, PairMotion]] = MOTIONS["spatial"]
 
     @cached_property
     def order(self) -> tuple[int, ...]:

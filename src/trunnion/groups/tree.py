@@ -30,8 +30,8 @@ from trunnion.algebra.namespace import Number, apart, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.groups import redundant
 from trunnion.groups.redundant import Support
+from trunnion.joints.pair_motion import PairMotion
 from trunnion.joints.pairs import PAIRS, Pair
-from trunnion.joints.spatial import PairMotion
 
 __all__ = ["CLOSED", "OUTER", "Coordinates", "Element", "GroupJoint", "Pose", "Step", "Tree"]
 
@@ -375,7 +375,7 @@ class Tree(ABC):
             ]
             last = functools.reduce(np.maximum, moves)
             shrink = 1 / np.maximum(last, 1.0)  # as a whole, so that the direction stays
-            after = self._advanced(now, [[value * shrink for value in values] for values in steps], size)
+            after = self.advanced(now, [[value * shrink for value in values] for values in steps], size)
             further, arrived_at = [*self._in_row(after), last], arrived(state)
             return (
                 further
@@ -419,13 +419,13 @@ class Tree(ABC):
 
     def _step(self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number]) -> Coordinates:
         """One whole Newton step."""
-        return self._advanced(q, self._steps(elements, q, size, drive), size)
+        return self.advanced(q, self._steps(elements, q, size, drive), size)
 
     def _steps(self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number]) -> Coordinates:
         """Newton's step in every freedom, slides in units of the size; 0 for the driven."""
         _, placed, screws = self.place(elements, q)
         moves = self.solved(self.jacobian(placed, screws, size, drive), self.gaps(placed, q, size, drive))
-        steps = self._unmoved()
+        steps = self.unmoved()
         for (k, i), move in zip(self.free, moves, strict=True):
             steps[k][i] = -move
         return steps
@@ -434,10 +434,12 @@ class Tree(ABC):
         """J⁻¹ gap."""
         return redundant.least_squares(jacobian, gaps) if self.redundant else linalg.solve(jacobian, gaps)[0]
 
-    def _unmoved(self) -> Coordinates:
+    def unmoved(self) -> Coordinates:
+        """No step in any freedom."""
         return [[0.0] * len(self.motion(k).steps) for k in range(len(self.joints))]
 
-    def _advanced(self, q: Coordinates, steps: Coordinates, size: Number) -> Coordinates:
+    def advanced(self, q: Coordinates, steps: Coordinates, size: Number) -> Coordinates:
+        """The coordinates after steps in the freedoms, slides in units of the size."""
         moved: Coordinates = []
         for k, (values, step) in enumerate(zip(q, steps, strict=True)):
             motion = self.motion(k)
@@ -511,7 +513,7 @@ class Tree(ABC):
         return self.entries(chord, pose.elements[chord], relative, pose.size)
 
     def _driven_only(self, drive: Sequence[Number]) -> Coordinates:
-        rates = self._unmoved()
+        rates = self.unmoved()
         for k, value in zip(self.driven, drive, strict=False):
             rates[k][0] = value
         return rates

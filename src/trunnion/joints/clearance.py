@@ -26,9 +26,10 @@ from typing import Any
 
 import numpy as np
 
+from trunnion.algebra import plane
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import Frame
-from trunnion.algebra.vector import Vector3, cross, dot
+from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, minus, scaled
 
 __all__ = [
     "CLEARANCE_MODELS",
@@ -45,7 +46,6 @@ __all__ = [
 
 Vector = tuple[Number, ...]  # of as many components as its end has
 Offsets = Sequence[Vector]  # one vector for each end
-NULL: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ClearanceModel:
     ends: for each end the names of its components, "end.axis" in the hole's frame. axial: which ends are held by the
     end float alone, not by the radial clearance. loads: `(force, moment, length)` → load at each end, from the force
     (N) and the moment (N m) about mid-length of the pin on the hole, in the hole's frame; shift: `(offsets, length)`
-    → the pin's frame in the hole's: a `space.Frame`, in the plane (x, y, cos, sin); size: the part and its key whose
+    → the pin's frame in the hole's, a `Frame` of `algebra.space` or `algebra.plane`; size: the part and its key whose
     number is the length H; turns: whether the pair does nothing but turn, so that a seat that stays on the link of the
     pin is another than one that stays on that of the hole.
     """
@@ -109,28 +109,6 @@ def _pin_shift(offsets: Offsets, length: Number) -> Frame:
     return leaning(((x2 - x1) / length, (y2 - y1) / length), along, (0.5 * (x1 + x2), 0.5 * (y1 + y2)))
 
 
-def _rectangular_shift(offsets: Offsets, length: Number) -> Frame:
-    (x1,), (y1,), (x2,), (y2,) = offsets
-    return _pin_shift([(x1, y1), (x2, y2)], length)
-
-
-def _ball_shift(offsets: Offsets, length: Number) -> Frame:
-    x, y, z = offsets[0]
-    return Frame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (x, y, z))
-
-
-def _planar_pin_shift(offsets: Offsets, length: Number) -> tuple[Number, Number, Number, Number]:
-    x, y = offsets[0]
-    return x, y, 1.0, 0.0
-
-
-def _planar_guide_shift(offsets: Offsets, length: Number) -> tuple[Number, Number, Number, Number]:
-    (y1,), (y2,) = offsets
-    slope = (y2 - y1) / length
-    c = 1 / namespace(slope).sqrt(1 + slope * slope)
-    return 0.0, 0.5 * (y1 + y2), c, slope * c
-
-
 def pin_transform(clearance: Number, length: Number, beta: Number, xi: Number) -> Frame:
     """Â of the pin-hole pair from [P]'s description, hole's frame → pin's frame.  [P 12-14]
 
@@ -181,28 +159,6 @@ def _pin_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
     gx, gy = moment[1] / length, -(moment[0] / length)
     hx, hy = 0.5 * force[0], 0.5 * force[1]
     return [(hx - gx, hy - gy), (hx + gx, hy + gy)]
-
-
-def _thrust_pin_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
-    return [*_pin_loads(force, moment, length), (force[2],)]
-
-
-def _rectangular_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
-    (x1, y1), (x2, y2) = _pin_loads(force, moment, length)
-    return [(x1,), (y1,), (x2,), (y2,)]
-
-
-def _ball_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
-    return [(force[0], force[1], force[2])]
-
-
-def _planar_pin_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
-    return [(force[0], force[1])]
-
-
-def _planar_guide_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
-    pair = moment[-1] / length
-    return [(0.5 * force[1] - pair,), (0.5 * force[1] + pair,)]
 
 
 def _size(load: Vector) -> Number:
@@ -271,13 +227,11 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
     xp = namespace(rate, *load)
     spins = rate > 0
     scale = 1 / xp.sqrt(xp.where(spins, rate, 1.0))
-    axis = tuple(scale * part for part in spin)
-    a: Vector3 = (axis[0], axis[1], axis[2])
+    a = scaled(scale, spin)
     size = _size(load)
     normal = size / xp.sqrt(1 + friction * friction)
     along = dot(pull, a)
-    side = tuple(q - along * part for q, part in zip(load, a, strict=True))
-    flat: Vector3 = (side[0], side[1], side[2])
+    flat = minus(pull, scaled(along, a))
     left = normal * normal - along * along  # N² (1 − α²)
     slips = (left > 0) & spins
     root = xp.sqrt(xp.where(slips, left, 1.0))
@@ -296,22 +250,55 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
     return parts[0], parts[1], parts[2]
 
 
+# ---- the table ------------------------------------------------------------------------------------------------
+
+
+def _guide_shift_in_plane(offsets: Offsets, length: Number) -> plane.Frame:
+    (y1,), (y2,) = offsets
+    slope = (y2 - y1) / length
+    c = 1 / namespace(slope).sqrt(1 + slope * slope)
+    return plane.Frame(0.0, 0.5 * (y1 + y2), c, slope * c)
+
+
 PIN_ENDS = (("1.x", "1.y"), ("2.x", "2.y"))
 PIN_LENGTH = ("pin", ("length", "bearing"))
 GUIDE_LENGTH = ("guide", ("length",))
 CLEARANCE_MODELS: dict[str, dict[str, ClearanceModel]] = {
     "planar": {
-        "revolute": ClearanceModel((("1.x", "1.y"),), _planar_pin_loads, _planar_pin_shift, turns=True),
-        "prismatic": ClearanceModel((("1.y",), ("2.y",)), _planar_guide_loads, _planar_guide_shift, GUIDE_LENGTH),
+        "revolute": ClearanceModel(
+            (("1.x", "1.y"),),
+            lambda force, moment, length: [(force[0], force[1])],
+            lambda offsets, length: plane.Frame(*offsets[0]),
+            turns=True,
+        ),
+        "prismatic": ClearanceModel(
+            (("1.y",), ("2.y",)),
+            lambda force, moment, length: [(0.5 * force[1] + sign * moment[-1] / length,) for sign in (-1.0, 1.0)],
+            _guide_shift_in_plane,
+            GUIDE_LENGTH,
+        ),
     },
     "spatial": {
         "revolute": ClearanceModel(
-            (*PIN_ENDS, ("3.z",)), _thrust_pin_loads, _pin_shift, PIN_LENGTH, axial=(2,), turns=True
+            (*PIN_ENDS, ("3.z",)),
+            lambda force, moment, length: [*_pin_loads(force, moment, length), (force[2],)],
+            _pin_shift,
+            PIN_LENGTH,
+            axial=(2,),
+            turns=True,
         ),
         "cylindrical": ClearanceModel(PIN_ENDS, _pin_loads, _pin_shift, PIN_LENGTH),
         "prismatic": ClearanceModel(
-            (("1.x",), ("1.y",), ("2.x",), ("2.y",)), _rectangular_loads, _rectangular_shift, GUIDE_LENGTH
+            (("1.x",), ("1.y",), ("2.x",), ("2.y",)),
+            lambda force, moment, length: [(part,) for end in _pin_loads(force, moment, length) for part in end],
+            lambda offsets, length: _pin_shift([(*offsets[0], *offsets[1]), (*offsets[2], *offsets[3])], length),
+            GUIDE_LENGTH,
         ),
-        "spherical": ClearanceModel((("1.x", "1.y", "1.z"),), _ball_loads, _ball_shift, turns=True),
+        "spherical": ClearanceModel(
+            (("1.x", "1.y", "1.z"),),
+            lambda force, moment, length: [(force[0], force[1], force[2])],
+            lambda offsets, length: Frame(*IDENTITY, (offsets[0][0], offsets[0][1], offsets[0][2])),
+            turns=True,
+        ),
     },
 }

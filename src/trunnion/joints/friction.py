@@ -91,7 +91,6 @@ def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
     normal: load of the contact ≥ 0, N; slip: speed of the second body against the first, m/s.
     The product f′ = pair_factor · coefficient is the coefficient of the pair; 4/3 of the material's is usual for
     a worn-in bearing (Baranov 1979, cited by [D]). At slip = 0 the force is an interval, here its middle, 0.
-    Source: Durango, Calle, Ruiz (2010), eq. 8.
     """
     xp = namespace(normal, slip)
     return -xp.sign(slip) * (parameters["pair_factor"] * parameters["coefficient"]) * normal
@@ -101,18 +100,12 @@ def viscous(normal: Number, slip: Number, **parameters: Number) -> Number:
     """Coulomb friction that grows with speed: −(sgn(v) f′ + c v) N, f′ = pair_factor · coefficient.
 
     The viscous part is stated per load (c in s/m), so that an unloaded contact does not resist.
-    Source: H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert, P. Lischinsky, Friction models and friction
-    compensation, Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X, section 2.
     """
     return coulomb(normal, slip, **parameters) - parameters["viscous"] * slip * normal
 
 
 def stiction(normal: Number, slip: Number, **parameters: Number) -> Number:
-    """Coulomb friction whose coefficient at rest, f_s = static, falls to f = coefficient at once where sliding begins.
-
-    Source: C. A. Coulomb, Théorie des machines simples, 1785; B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit,
-    Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7, section 2.
-    """
+    """Coulomb friction whose coefficient at rest, f_s = static, falls to f = coefficient where sliding begins."""
     return -namespace(normal, slip).sign(slip) * parameters["coefficient"] * normal
 
 
@@ -124,10 +117,6 @@ def stiction_at_rest(normal: Number, slip: Number, **parameters: Number) -> Numb
 def stribeck(normal: Number, slip: Number, **parameters: Number) -> Number:
     """Friction that falls from rest to sliding and rises with speed:
     −sgn(v) [f + (f_s − f) exp(−(v/v_s)²) + c |v|] N, f = coefficient, f_s = static.
-
-    Source: R. Stribeck (1902); this form: B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A survey of models,
-    analysis tools and compensation methods for the control of machines with friction, Automatica 30 (1994)
-    1083-1138, doi:10.1016/0005-1098(94)90209-7.
     """
     xp = namespace(normal, slip, *parameters.values())
     return -(xp.sign(slip) * _stribeck_curve(slip, parameters) + parameters["viscous"] * slip) * normal
@@ -136,10 +125,6 @@ def stribeck(normal: Number, slip: Number, **parameters: Number) -> Number:
 def brown_mcphee(normal: Number, slip: Number, **parameters: Number) -> Number:
     """Friction that is a smooth function of speed, with a peak near the transition speed v_t:
     −N [f tanh(4 r) + (f_s − f) r/(r²/4 + 3/4)² + c v], r = v/v_t, f = coefficient, f_s = static.
-
-    Source: P. Brown, J. McPhee, A continuous velocity-based friction model for dynamics and control with physically
-    meaningful parameters, J. Comput. Nonlinear Dyn. 11 (2016) 054502, doi:10.1115/1.4033658; the viscous part is
-    stated per load.
     """
     xp = namespace(normal, slip, *parameters.values())
     f, static = parameters["coefficient"], parameters["static"]
@@ -153,8 +138,6 @@ def dahl(normal: Number, slip: Number, **parameters: Number) -> Number:
 
     From rest the force rises as f N (1 − exp(−κ x/f)) over the way x. κ (stiffness) is the stiffness of the contact per
     load, 1/m, so that f/κ is the way over which the friction turns round.
-    Source: P. R. Dahl, A solid friction model, Aerospace Corporation, TOR-0158(3107-18)-1, 1968; this form (i = 1):
-    H. Olsson et al., Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X.
     """
     stiffness = parameters["stiffness"]
     deflection = parameters.get("deflection")
@@ -173,8 +156,6 @@ def lugre(normal: Number, slip: Number, **parameters: Number) -> Number:
     g(v) = f + (f_s − f) exp(−(v/v_s)²), f = coefficient, f_s = static.
 
     In steady sliding it is −sgn(v) g(v) N − c v N. κ, σ and c are stated per load, 1/m and s/m.
-    Source: C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, A new model for control of systems with
-    friction, IEEE Trans. Autom. Control 40 (1995) 419-425, doi:10.1109/9.376053.
     """
     stiffness, decay = parameters["stiffness"], lugre_relaxation(slip, **parameters)
     deflection = parameters.get("deflection")
@@ -208,10 +189,7 @@ def rolling_bearing(normal: Number, slip: Number, **parameters: Number) -> Numbe
 
 
 def rolling(normal: Number, slip: Number, **parameters: Number) -> Number:
-    """Rolling friction with a lever arm f: a moment f N against the rate; −sgn(v) N at the lever f.
-
-    Source: C. A. Coulomb, Théorie des machines simples, 1785. Handbooks state f in mm, some 0.5 of wheels on rails.
-    """
+    """Rolling friction with a lever arm f: a moment f N against the rate; −sgn(v) N at the lever f."""
     xp = namespace(normal, slip)
     return -xp.sign(slip) * normal
 

@@ -138,7 +138,6 @@ def modified_sine(u: Number) -> Drive:
     """Modified sine: acceleration is a sine of period 1/2 in the first and last eighth, of period 3/2 between.
 
     With c = π/(4 + π): s″ = 4πc sin 4πu, 4πc cos(4πu/3 − π/6), 4πc sin 4πu.
-    Source: C. N. Neklutin, Mechanisms and Cams for Automatic Machines, Elsevier 1969; R. L. Norton, chapter 8.
     """
     xp = namespace(u)
     c = np.pi / (4 + np.pi)

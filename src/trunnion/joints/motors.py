@@ -59,10 +59,7 @@ def constant(speed: Array, time: Array, parameters: Parameters, integral: Array)
 
 
 def linear(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
-    """Direct-current motor: T = T_s (1 − ω/ω₀), T_s at standstill, ω₀ without load.
-
-    Source: A. Hughes, B. Drury, Electric Motors and Drives, 5th ed., Newnes, 2019, chapter 3.
-    """
+    """Direct-current motor: T = T_s (1 − ω/ω₀), T_s at standstill, ω₀ without load."""
     effort: Array = parameters["stall_effort"] * (1.0 - speed / parameters["no_load_speed"])
     return effort
 
@@ -71,7 +68,6 @@ def induction(speed: Array, time: Array, parameters: Parameters, integral: Array
     """Induction motor by Kloss's formula: T = 2 T_k/(s/s_k + s_k/s), s = 1 − ω/ω_s; 0 at the synchronous speed.
 
     Written as 2 T_k s s_k/(s² + s_k²), which has a value at s = 0 too.
-    Source: M. Kloss, Drehmoment und Schlüpfung des Drehstrommotors, Archiv für Elektrotechnik 5 (1916) 59-87.
     """
     slip, most = 1.0 - speed / parameters["synchronous_speed"], parameters["breakdown_slip"]
     effort: Array = 2.0 * parameters["breakdown_effort"] * slip * most / (slip * slip + most * most)
@@ -86,10 +82,7 @@ def table(speed: Array, time: Array, parameters: Parameters, integral: Array) ->
 
 
 def speed_control(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
-    """Controller of the speed: T = K_p (ω* − ω) + K_i ∫ (ω* − ω) dt, between −limit and limit.
-
-    Source: K. J. Åström, R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press, 2021, chapter 11.
-    """
+    """Controller of the speed: T = K_p (ω* − ω) + K_i ∫ (ω* − ω) dt, between −limit and limit."""
     limit = parameters["limit"]
     return np.clip(_wanted(speed, parameters, integral), -limit, limit)
 

@@ -225,7 +225,7 @@ def _reaction(measure: MotionRequest, back: Backward) -> Number:
 def _end_load(measure: MotionRequest, back: Backward) -> Number:
     """The largest of |F⊥/2 ∓ g| with g = M⊥ × u/L, N: what presses on the ends of a bearing or guide of the length L.
 
-    It is the load that friction with two contacts counts, see `joints.spatial_load`.
+    It is the load that friction with two contacts counts, see `joints.contact_loads`.
     """
     joint = measure.subject
     loads = loads_on_ends(back.walk, joint, back.reactions[joint], back.friction_wrenches[joint])

@@ -19,8 +19,8 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Frame, Screw, about, moment_at
 from trunnion.algebra.vector import Vector3, cross, dot, minus, plus, scaled
-from trunnion.joints.pairs import PAIRS, ContactLoad, PlanarContactLoad
-from trunnion.joints.spatial_load import BallLoad, BearingLoad
+from trunnion.joints.contact_loads import BallLoad, BearingLoad, ContactLoad, GuideLoad, PinLoad
+from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction_problem import Rubbing
 
@@ -100,12 +100,12 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
             yield from (_thread(walk, name, lever, speed, zero) for name in walk.system.screws[joint])
             return
         lever, turning = _lever(walk, joint)
-        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=turning)
+        yield Rubbing(PinLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=turning)
         return
     axis, middle = walk.ends(joint)
     at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
     arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
-    load = PlanarContactLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
+    load = GuideLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
     yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)
 
 
@@ -126,7 +126,7 @@ def _thread(walk: Forward, name: str, lever: Number, speed: Number, zero: Number
     helix = xp.sqrt(lever * lever + lead * lead)
     secant = helix / lever / (xp.abs(lead) if name in walk.system.turned_round else 1.0)
     # a guide of length 2/s under a moment M alone presses with |M| s
-    load = PlanarContactLoad((1.0, 0.0), 2.0 / secant)
+    load = GuideLoad((1.0, 0.0), 2.0 / secant)
     moment = lever * lever / helix
     return Rubbing(load, helix * speed, Wrench(0.0, 0.0, moment), zero, amount=moment)
 

@@ -24,8 +24,8 @@ from trunnion.algebra.plane import Twist, Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, minus, plus, scaled, transpose
 from trunnion.groups.tree import Element
-from trunnion.joints.pairs import PAIRS, Pair, Reaction
-from trunnion.joints.spatial_load import halves
+from trunnion.joints.contact_loads import Reaction, halves
+from trunnion.joints.pairs import PAIRS, Pair
 from trunnion.model.parts import InertiaTensor
 from trunnion.solve import shifts
 from trunnion.solve.system import Place, System, Values, driven_coordinates

@@ -23,7 +23,7 @@ import numpy as np
 from trunnion.algebra import linalg
 from trunnion.algebra.literal import plus
 from trunnion.algebra.namespace import Number, apart, looped, recurring
-from trunnion.joints.pairs import Reaction
+from trunnion.joints.contact_loads import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Contact, FrictionProblem, largest

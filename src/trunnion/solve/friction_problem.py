@@ -21,7 +21,7 @@ from trunnion.algebra.linalg import weighted
 from trunnion.algebra.literal import less, plus, times
 from trunnion.algebra.namespace import Number, apart
 from trunnion.algebra.nested import replaced
-from trunnion.joints.pairs import ContactLoad, Reaction
+from trunnion.joints.contact_loads import ContactLoad, Reaction
 
 __all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "largest"]
 
@@ -47,8 +47,7 @@ class Contact(NamedTuple):
 
     def mapped(self, change: Callable[[Number], Number]) -> Contact:
         """The same with `change` applied to every number that friction depends on."""
-        load: ContactLoad = self.load.mapped(change)
-        return self._replace(load=load, slope=change(self.slope))
+        return self._replace(load=self.load.mapped(change), slope=change(self.slope))
 
 
 class Rubbing(NamedTuple):

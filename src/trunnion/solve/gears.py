@@ -10,7 +10,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import ZERO_LOAD, Wrench, added, power
 from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh, thread_forces
 from trunnion.groups.general import General
-from trunnion.joints.pairs import PlanarContactLoad
+from trunnion.joints.contact_loads import GuideLoad
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_problem import Contact
 
@@ -50,7 +50,7 @@ def teeth(walk: Forward, number: int) -> Iterator[Contact]:
         if angle is None:  # a chain or rope
             continue
         # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
-        load = PlanarContactLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
+        load = GuideLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
         slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
         yield Contact(len(places) + i, unit_loads, load, slope, rubs=False)
 

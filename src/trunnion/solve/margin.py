@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.joints.pairs import Reaction
+from trunnion.joints.contact_loads import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, pass_on, unloaded
 from trunnion.solve.friction import (

@@ -162,7 +162,7 @@ def seated(of: str, frame: Any, kind: str, values: Values, joint: str, carrier: 
     offsets = model.offsets(values, f"{carrier}.{joint}") if model else None
     if model is None or offsets is None:
         return frame
-    local = ALGEBRAS[of].Frame(*model.shift(offsets, length_of(model, values, joint)))
+    local = model.shift(offsets, length_of(model, values, joint))
     lay = ALGEBRAS[of].compose if carrier == HOLE else ALGEBRAS[of].relative
     return _in_hole(frame, values, joint, lambda middle: lay(middle, local))
 

@@ -38,7 +38,6 @@ from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
-from trunnion.joints.spatial import MOTIONS
 from trunnion.solve import shifts
 from trunnion.solve.assembly import Chosen, choose, distance
 from trunnion.solve.forward import posed, start
@@ -196,12 +195,10 @@ class Loops:
     def moved(self, q: Array, steps: Array) -> Array:
         """Coordinates (lane, kept) after steps (lane, free) in every free coordinate, slides in units of the size."""
         group = self.group
-        parts: list[list[Number]] = [[0.0] * len(MOTIONS[joint.kind].steps) for joint in group.joints]
+        by_joint = group.unmoved()
         for (k, i), step in zip(group.free, steps.T, strict=True):
-            parts[k][i] = step * self.size if group.slides(k, i) else step
-        coordinates: list[Number] = []
-        for joint, values, step in zip(group.joints, self._coordinates(q), parts, strict=True):
-            coordinates += MOTIONS[joint.kind].advanced(values, step)
+            by_joint[k][i] = step
+        coordinates = [n for joint in group.advanced(self._coordinates(q), by_joint, self.size) for n in joint]
         return np.stack([np.broadcast_to(coordinates[i], (len(q),)) for i in group.kept], axis=-1)
 
     def least_open(self, q: Array, c: Array) -> tuple[Array, Array]:

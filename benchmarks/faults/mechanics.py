@@ -458,8 +458,8 @@ _DYNAMICS = (
     Fault(
         "rotor-without-its-ratio",
         "dynamics/motor.py",
-        "integral, now) - self.inertia * self.ratio * second\n        return transmitted(",
-        "integral, now) - self.inertia * second\n        return transmitted(",
+        "integral, now) - self.inertia * self.ratio * second",
+        "integral, now) - self.inertia * second",
         ("tests/reference/test_motion_in_time.py", "-k", "rotor"),
     ),
     Fault(
@@ -471,9 +471,9 @@ _DYNAMICS = (
     ),
     Fault(
         "friction-of-the-other-sense-at-rest",
-        "dynamics/rest.py",
-        "miss = sense * (drive_given - demanded)[0]",
-        "miss = (drive_given - demanded)[0]",
+        "dynamics/state.py",
+        "miss = sense * (self.given(begins",
+        "miss = (self.given(begins",
         ("tests/reference/test_motion_in_time.py", "-k", "weak or breaks"),
     ),
     Fault(
@@ -555,8 +555,8 @@ _CONTACT = (
     Fault(
         "machine-code-of-other-numbers",
         "dynamics/compiled_rates.py",
-        "self.motion.rests, *self.constant.items()",
-        "self.motion.rests",
+        "bool(self.motion.resisted), *self.constant.items()",
+        "bool(self.motion.resisted)",
         ("tests/invariants/test_steady_cycle.py", "-k", "nothing_or_one"),
     ),
     Fault(

@@ -63,14 +63,17 @@ def compared(mechanism: Mechanism, lanes: int = 5) -> None:
     for _ in range(lanes):
         q, v = rng.uniform(-10, 10), rng.normal() * pace
         bristles = rng.normal(0, 1e-6, (len(motion.bristles), 1))
-        sense = float(np.sign(v)) if motion.sticking else 0.0
-        at = Moment(np.array([0.1]), np.array([[q]]), np.array([[v]]), np.zeros((1, 1)), bristles, sense, 0.1)
+        senses = (int(np.sign(v)),) if motion.resisted else ()
+        at = Moment(
+            np.array([0.1]), np.array([[q]]), np.array([[v]]), np.zeros((1, 1)), bristles, now=0.1, senses=senses
+        )
         with np.errstate(all="ignore"):
             wanted, found = walks(at), compiled(at)
         assert found.second == pytest.approx(wanted.second, rel=1e-9)
-        assert found.bristles == pytest.approx(wanted.bristles, rel=1e-9)
-        size = np.max(np.abs(wanted.works))
-        assert np.abs(found.works - wanted.works).max() < 1e-9 * size
+        rates = 1 + len(bristles)  # of the controller's integral and of the bristles
+        assert found.others[:rates] == pytest.approx(wanted.others[:rates], rel=1e-9)
+        size = np.max(np.abs(wanted.others[rates:]))
+        assert np.abs(found.others - wanted.others)[rates:].max() < 1e-9 * size
 
 
 @pytest.mark.spread(2)

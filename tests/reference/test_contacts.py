@@ -132,7 +132,7 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
             at = Layout.of(motion).moment(np.array([1e-4]), state[:, None])._replace(onsets=onsets, senses=senses)
             one, other = compiled(at), Walks(motion)(at)
             assert np.allclose(one.second, other.second, rtol=1e-9)
-            assert np.allclose(one.works, other.works, rtol=1e-9, atol=1e-13 * np.max(np.abs(other.second)))
+            assert np.allclose(one.others, other.others, rtol=1e-9, atol=1e-13 * np.max(np.abs(other.second)))
             for seen, wanted in zip(compiled.look(at), Walks(motion).look(at), strict=True):
                 assert np.allclose(seen, wanted, rtol=1e-9, atol=1e-15)
 

@@ -33,6 +33,11 @@ def newton_step(slopes: Array, missed: Array, shares: Array) -> tuple[Array, Fla
     """
     step, turned = np.full(missed.shape, np.nan), np.zeros(missed.shape[1], bool)
     sound = np.all(np.isfinite(slopes), axis=(0, 1)) & np.all(np.isfinite(missed), axis=0)
+    if len(shares) == 1 and len(missed) == 2:  # one coordinate that rests
+        (_, resisting), (way, _) = slopes
+        step[0] = -missed[1] / way
+        step[1] = -(missed[0] + slopes[0, 0] * step[0]) / np.where(resisting != 0.0, resisting, np.nan)
+        return step, sound & (resisting * way < 0.0)
     if len(shares):
         for lane in np.flatnonzero(sound):
             step[:, lane], turned[lane] = _with_shares(slopes[:, :, lane], missed[:, lane], shares[:, lane])

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
-from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, beside
+from trunnion.dynamics.rates import Layout, Rates, Seen, Walks, beside
 from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
@@ -66,18 +66,17 @@ class CompiledRates:
         self.constant = literals({path: value for path, value in motion.values.items() if path not in varied})
         self.walks = Walks(motion)
         self.layout = Layout.of(motion)
-        others = self.layout.bristles + len(WORKS) + self.layout.touching
-        self._last = 2 * self.layout.coordinates + others  # of what is integrated
+        self._last = self.layout.size - self.layout.coordinates  # of what is integrated
         self._programs: dict[tuple[Any, ...], Program | None] = {}
         self._asked: tuple[Any, Program | None] = None, None
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane. This is asked for some hundred thousand times."""
         if program := self._program("rates", at):
-            state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
-            numbers = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
+            numbers = program.of_row(at)
             if numbers[-1] == 0.0 and math.isfinite(numbers.sum()):
-                return self.layout.rates(numbers[: self._last].copy())
+                n, numbers = self.layout.coordinates, numbers.copy()
+                return Rates(numbers[:n], numbers[n : self._last], True)
         return self.walks(at)
 
     def seconds(self, at: Moment) -> Array:
@@ -119,10 +118,11 @@ class CompiledRates:
         senses = at.senses if what == "rates" else ()
         if 0 in senses or (closed and not self.motion.affine):
             return None
+        senses = senses if self.motion.several else ()
         switches = tuple(drive.switches(at.now) for drive in self.motion.drives.values())
         key = what, touching, switches, senses, at.slips
         if key not in self._programs:
-            key_of_all = *key, self.motion.affine, self.motion.rests, *self.constant.items()
+            key_of_all = *key, self.motion.affine, bool(self.motion.resisted), *self.constant.items()
             if key_of_all not in self.codes:
                 self.codes[key_of_all] = _code(self.motion, what, touching, switches, senses, at.slips, self.constant)
             code = self.codes[key_of_all]
@@ -161,17 +161,19 @@ def _code(
     n, graph = len(motion.names), Graph()
     paths = tuple(path for path in _numbers(motion) if path not in constant)
     recorded: dict[str, Any] = {path: Recorded(graph, graph.input(path, 0)) for path in paths}
-    variables = (*(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n)), *motion.bristles)
+    clutch = ["slip"] if any(drive.clutched for drive in motion.drives.values()) else []
+    variables = (*(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n)), *motion.bristles, *clutch)
     states = ("time", *(f"state.{name}" for name in variables), "sense")
     time, *state, sense = [Recorded(graph, graph.input(name, POSITION)) for name in states]
+    slip: Any = [state.pop() for _ in clutch]
     onsets = {k: f"onset{k}" for k, touches in enumerate(touching) if touches is True}
     approach: dict[int, Any] = {k: Recorded(graph, graph.input(name, 0)) for k, name in onsets.items()}
     q, rate, integral, bristles = cast("Any", (state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]))
     begun = tuple(each if isinstance(each, Closed) else approach.get(k) for k, each in enumerate(touching))
-    at = Moment(cast("Any", time), q, rate, integral, bristles, onsets=begun, senses=senses, slips=slips)
+    at = Moment(cast("Any", time), q, rate, integral, bristles, slip, onsets=begun, senses=senses, slips=slips)
     figures = {"rates": _rates_of, "margins": _margins, "look": _seen}[what]
-    if motion.rests:  # also where a speed is lost in rounding, it is known in which sense joints slide
-        at = at._replace(sense=cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)))
+    if motion.resisted and not motion.several:  # where a speed is lost in rounding, the sense is known still
+        at = at._replace(senses=(cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)),))
     try:
         with np.errstate(all="ignore"):
             numbers = figures(_recorded(motion, {**constant, **recorded}, switches), at)
@@ -210,8 +212,7 @@ class Program:
 
     def run(self, at: Moment) -> Array:
         """The numbers, (number, lane)."""
-        sense = np.full((1, len(at.time)), at.sense)
-        state, parts = np.vstack([at.time[None], at.q, at.rate, at.integral, at.bristles, sense]), list[Array]()
+        state, parts = np.vstack([at.time[None], *at[1:6], np.full((1, len(at.time)), self._sense(at))]), list[Array]()
         self._begin(at.onsets)
         for low in range(0, state.shape[1], self.lanes):
             part = state[:, low : low + self.lanes]
@@ -220,15 +221,20 @@ class Program:
             parts.append(self.found[:, : part.shape[1]].copy())
         return np.hstack(parts)
 
-    def of_row(self, time: float, state: Array, onsets: Sequence[Onset], sense: float = 0.0) -> Array:
-        """The numbers of one state: coordinates, rates, integrals, deflections; overwritten by the next."""
-        self._begin(onsets)
-        self.state[0, : self.width] = time
-        self.state[1:-1, : self.width] = state[:, None]
-        self.state[-1, : self.width] = sense
+    def of_row(self, at: Moment) -> Array:
+        """The numbers of one state, overwritten by the next."""
+        self._begin(at.onsets)
+        self.state[0, : self.width] = at.time[0]
+        self.state[1:-1, : self.width] = np.concatenate(at[1:6])
+        self.state[-1, : self.width] = self._sense(at)
         self._short()
         values: Array = self.found[:, 0]
         return values
+
+    @staticmethod
+    def _sense(at: Moment) -> int:
+        """Of the motion of one coordinate that may rest."""
+        return at.senses[0] if at.senses else 0
 
     def _begin(self, onsets: Sequence[Onset]) -> None:
         begun = (onset for onset in onsets if onset is not None and not isinstance(onset, Closed))
@@ -253,11 +259,11 @@ def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
     """Accelerations, rates of the controllers' integrals and of deflections, works, as `rates.Walks` has them, where
     contacts of rigid bodies are closed also what `rates.Seen` has; 1 where there is doubt."""
     second, at, doubt = _affine(motion, at) if motion.affine else _by_rounds(motion, at)
-    back = motion.solve(at, cast("Any", second), sliding=True)
+    back = motion.solve(at, cast("Any", second), motion.senses(at), sliding=True)
     for settled in back.settled:
         doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
     seen = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
-    return [*second, *beside(motion, at, back), *seen, doubt]
+    return [*second, *beside(motion, at, second, back), *seen, doubt]
 
 
 def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
@@ -322,8 +328,8 @@ def _affine(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Numbe
 
 def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) -> list[Number]:
     """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0."""
-    back = motion.solve(at, second, sliding=True)
-    driven = motion.driven(at, second, motion.beginning(at))
+    senses = motion.senses(at)
+    back, driven = motion.solve(at, second, senses, sliding=True), motion.driven(at, second, senses)
     moved = {k: motion.contacts.each[k].accelerations(back.walk) for k in active.closed}
     efforts = [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
     return [*efforts, *(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)]

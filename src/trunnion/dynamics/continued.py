@@ -20,7 +20,7 @@ from trunnion.dynamics.prepared import integration_of
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.solution import CLOSE, Solution
 from trunnion.dynamics.start import initial_row, places
-from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.state import FreeMotion, Mode
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
@@ -74,7 +74,7 @@ class Continued:
                 self.inputs[path] = single(self.run.values[path])
         self._varied, self._applied = frozenset(self.inputs), dict[str, float]()
         self._codes: Codes = {}
-        self._places, self._row, self._senses = places(self.motion), initial_row(self.motion), tuple[int, ...]()
+        self._places, self._row, self._mode = places(self.motion), initial_row(self.motion), Mode()
         check_start(self.motion, self._row, self._places.limits)
         self._snapshot: Snapshot | None = None
         self._rates: CompiledRates | Walks = Walks(self.motion)
@@ -95,7 +95,7 @@ class Continued:
         solution = integration.solution
         if solution.ended is None:
             self.time, self._row = integration.last
-            self._senses, self._snapshot = integration.senses, integration.snapshot
+            self._mode, self._snapshot = integration.mode, integration.snapshot
             return self._books(solution, self.time)
         findings = motion_findings(self.motion, solution, self.run)
         self.ended = next(finding for finding in findings if finding.code == solution.ended.code)
@@ -113,7 +113,7 @@ class Continued:
             self._rates, self._applied = rates_of(self.motion, self._codes, self._varied), dict(self.inputs)
         self.motion.begin(self._snapshot)
         integration = integration_of(
-            self.motion, self._rates, self._places, until, self.tolerance, start=self.time, senses=self._senses
+            self.motion, self._rates, self._places, until, self.tolerance, start=self.time, mode=self._mode
         )
         integration.run(self._row.copy())
         return integration

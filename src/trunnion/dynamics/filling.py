@@ -22,7 +22,6 @@ from trunnion.cycle import fill
 from trunnion.cycle.fill import fill_chunk
 from trunnion.dynamics.opened import Opened, in_play
 from trunnion.dynamics.rates import kinetic_energy, potential_energy
-from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import Impact, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contacts, ContactState, Push
@@ -73,14 +72,10 @@ def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened |
     resting = np.zeros(len(time), bool)
     arrays["status"][...] = Status.NOT_CONVERGED
     for lanes, stretch in _alike(solution, which):
-        at = layout.moment(time[lanes], rows[:, lanes], stretch.sense, stretch.now, stretch.slips)
-        at, onsets = at._replace(onsets=stretch.onsets, senses=stretch.senses), stretch.onsets
         motion.begin(stretch.snapshot)
-        if stretch.resting and not motion.resisted:  # with the shares of the friction that hold it
-            seconds[:, lanes], back = 0.0, Rest(motion, layout, stretch.slips).back(at)
-        else:
-            accelerated = motion.accelerate(at)
-            seconds[:, lanes], back, onsets = accelerated.second, accelerated.back, accelerated.onsets
+        at = layout.moment(time[lanes], rows[:, lanes], stretch.mode)
+        accelerated = motion.accelerate(at)
+        seconds[:, lanes], back, onsets = accelerated.second, accelerated.back, accelerated.onsets
         window = slice(int(lanes[0]), int(lanes[-1]) + 1)
         energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
         touched = motion.contacts.pushes(back.walk, onsets)
@@ -90,7 +85,7 @@ def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened |
         if stated is not None:
             stated.fill(arrays, stated_back.walk, touched, window)
         resting[lanes] = stretch.resting
-        for name, sense in zip(motion.resisted, stretch.senses, strict=False):
+        for name, sense in zip(motion.resisted, stretch.mode.senses, strict=False):
             sticking[list(system.joints).index(name), lanes] = sense == 0
     for array in arrays.values():  # there is no motion any more
         if array.dtype == np.float64:
@@ -99,7 +94,7 @@ def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened |
     fill.unwrap(arrays, system, motion.values_at(moments, np.nan_to_num(seconds)), time)
     if stated is not None:
         energies = np.vstack([energies, touches.stored.sum(axis=0)])
-    one_by_one = sticking if motion.resisted else None
+    one_by_one = sticking if motion.resisted and motion.several else None
     labels, works = fill.labels(system), layout.works(rows)
     return Books(time, arrays, labels, moments, seconds, energies, works, resting, touches, one_by_one)
 
@@ -109,7 +104,7 @@ def _alike(solution: Solution, which: NDArray[np.intp]) -> Iterator[tuple[NDArra
 
     def key(row: Any) -> object:
         stretch = solution.stretches[which[row]]
-        return *stretch[3:6], id(stretch.snapshot), *stretch[7:]
+        return stretch.mode, stretch.resting, id(stretch.snapshot)
 
     for _, rows in itertools.groupby(np.flatnonzero(which >= 0), key):
         lanes = np.array(list(rows))

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.findings import effort_units
-from trunnion.dynamics.rest import Rest
-from trunnion.dynamics.solution import Ended, Solution, Stretch
+from trunnion.dynamics.solution import Ended, Solution
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.touching import SLOWEST
 from trunnion.errors import Finding, Status, agreeing, counted
@@ -142,7 +141,7 @@ def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
     what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, and {readable(energy, 'J')} is lost"
     remedy = "see `trunnion locking` for where and by how much"
     figures = {"joints": joints, "times": times, "time": locks[0].time, "energy": energy}
-    if motion.resisted:
+    if motion.several:
         yield Finding.warning("simulate.joints_lock", f"joints.{joints[0]}", what, remedy, **figures)
     else:
         yield Finding.warning("simulate.locks", f"drivers.{joints[0]}", what, remedy, **figures)
@@ -154,16 +153,17 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     if not (rests and solution.stretches and solution.stretches[-1].resting):
         return
     last = solution.stretches[-1]
-    at = solution.layout.moment(np.array([last.begin]), solution.at(np.array([last.begin]))[0], now=last.now)
-    if motion.resisted:
-        shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
+    at = last.at(solution.layout, np.array([last.begin]))
+    if motion.several:
+        shares = np.abs(np.asarray(motion.accelerate(at).shares)[:, 0])
         joint, share = motion.resisted[int(np.argmax(shares))], float(np.max(shares))
         where, subject = f"joints.{joint}", "every free driver"
         acts = f"what acts needs {share:.2%} of what resists it at rest in {joint}, and no more in the other joints"
         figures: dict[str, Any] = {"joint": joint, "share": share}
     else:
         effort = effort_units(motion.system)[list(motion.system.mechanism.drivers).index(name)]
-        acting, needed = _holding(motion, solution, last)
+        acting, (forward, backward) = float(motion.given(at, 0.0 * at.q, {})[0, 0]), motion.excess(at)[:, 0]
+        needed = acting - forward if acting > 0 or (acting == 0 and forward >= backward) else acting + backward
         where, subject = f"drivers.{name}", name
         acts = f"{readable(acting, effort)} act on it, and it breaks away from {readable(needed, effort)} on"
         figures = {"driver": name, "given": acting, "needed": needed, "unit": effort}
@@ -171,25 +171,25 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     if all(stretch.resting for stretch in solution.stretches):
         remedy = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
         what = f"{subject} does not start: {acts}"
-        if motion.resisted:
+        if motion.several:
             yield Finding.warning("simulate.none_starts", where, what, remedy, **figures)
         else:
             yield Finding.warning("simulate.stays_at_rest", where, what, remedy, **figures)
     elif on := _on(motion, solution):
         turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
         place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
-        at_place, of = (f", at {readable(place, unit)}", "") if not motion.resisted else ("", f" of {', '.join(on)}")
+        at_place, of = (f", at {readable(place, unit)}", "") if not motion.several else ("", f" of {', '.join(on)}")
         what = f"{subject} stalls at {since}{at_place}, with the motor{of} on: {acts}"
         remedy = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
         figures["time"] = rests[-1]
-        if motion.resisted:
+        if motion.several:
             yield Finding.error("simulate.all_stall", where, what, remedy, **figures, drivers=on)
         else:
             yield Finding.error("simulate.stalls", where, what, remedy, **figures, coordinate=place, place=unit)
     else:
         what = f"{subject} comes to rest {counted(len(rests), 'time')}, for the last time at {since}: {acts}"
         figures |= {"time": rests[-1], "times": len(rests)}
-        if motion.resisted:
+        if motion.several:
             yield Finding.note("simulate.all_rest", where, what, **figures)
         else:
             yield Finding.note("simulate.rests", where, what, **figures)
@@ -198,25 +198,13 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
 def _on(motion: FreeMotion, solution: Solution) -> list[str]:
     """The free drivers whose motor still acts at the end, through its clutch if it has one, and is not braked."""
     last, time = solution.stretches[-1], np.array([solution.end])
-    at = solution.layout.moment(time, solution.at(time)[0], now=last.now)
+    at = solution.layout.moment(time, solution.at(time)[0], last.mode)
     return [
         name
         for i, (name, drive) in enumerate(motion.drives.items())
-        if not drive.braking(last.now)
-        and np.any(drive.seen(last.now, last.slips).shaft(time, at.rate[i], at.integral[i], last.now) != 0.0)
+        if not drive.braking(at.now)
+        and np.any(drive.seen(at.now, at.slips).shaft(time, at.rate[i], at.integral[i], at.now) != 0.0)
     ]
-
-
-def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[float, float]:
-    """Effort that acts as a rest begins, and the break-away effort: the way it acts, or the nearer one."""
-    time = np.array([stretch.begin])
-    rows, _ = solution.at(time)
-    at = solution.layout.moment(time, rows, 0.0, stretch.begin, stretch.slips)
-    acting = float(motion.given(at, np.zeros_like(at.q))[0, 0])
-    rest = Rest(motion, solution.layout, stretch.slips)
-    forward, backward = (float(effort[0]) for effort in rest.beyond(time, rows[:, 0], stretch.begin, stretch.begin))
-    ahead = acting > 0 or (acting == 0 and forward >= backward)
-    return acting, acting - forward if ahead else acting + backward
 
 
 def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:

@@ -224,14 +224,15 @@ class ImpactMotion(ActiveMotion):
         return [k for k, onset in enumerate(self.onsets) if onset is not None]
 
     def _set(self, onsets: Mapping[int, Closed | None]) -> None:
-        self.onsets = tuple(onsets.get(k, onset) for k, onset in enumerate(self.onsets))
+        onsets_now = tuple(onsets.get(k, onset) for k, onset in enumerate(self.onsets))
+        self.mode = self.mode._replace(onsets=onsets_now)
 
     # ---- impacts ----------------------------------------------------------------------------------------------
 
     def _impact(self, k: int, time: float, row: Array) -> float:
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
-        at = self.moment(time, row, 0.0, 0.0)
+        at = self.moment(time, row)
         linear = self.motion.linear(at)
         rates = linear.driven + linear.ways @ at.rate[:, 0]
         meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
@@ -278,7 +279,9 @@ class ImpactMotion(ActiveMotion):
         if not names:
             return 0.0
         free = at._replace(onsets=(None,) * self.count)
-        still, struck_so = (self.motion.solve(free, second) for second in (0.0 * at.q, change[:, None]))
+        still, struck_so = (
+            self.motion.solve(free, second, self.motion.senses(free)) for second in (0.0 * at.q, change[:, None])
+        )
         put_in = sum(single((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)) for name in names)
         rows = [*places, *(self.count + k for k in places)]
         return put_in - float(struck.impulse @ driven[rows])
@@ -294,7 +297,7 @@ class ImpactMotion(ActiveMotion):
         closed = [k for i, k in enumerate(places) if struck.cases[i] is not OPEN and self.onsets[k] is not None]
         free = [k for k in places if k not in closed]
         onsets = tuple(None if k in free else onset for k, onset in enumerate(self.onsets))
-        walk = self.motion.accelerate(self.moment(time, after, 0.0, 0.0)._replace(onsets=onsets)).back.walk
+        walk = self.motion.accelerate(self.moment(time, after)._replace(onsets=onsets)).back.walk
         for i, k in enumerate(places):
             speed, e = max(float(struck.after[i]), 0.0), float(self.restitution[k])
             pull = -single(self.motion.contacts.each[k].accelerations(walk)[0])
@@ -328,28 +331,29 @@ class ImpactMotion(ActiveMotion):
                 self.solution.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
-        if self.senses:
+        if self.mode.senses:
             self._torn(time, row)
         self._project(time, row, places)
         self.pauses = dict(pauses)
 
     def _torn(self, time: float, row: Array) -> None:
         """Joints that stuck until an impact slide on with the speeds that it leaves them."""
-        senses = list(self.senses)
-        for k, speed in enumerate(self.motion.ways(self.moment(time, row, 0.0, 0.0))[1]):
+        senses = list(self.mode.senses)
+        for k, speed in enumerate(self.motion.ways(self.moment(time, row))[1]):
             if abs(speed) > SLOW and np.sign(speed) != senses[k]:
                 if senses[k] == 0:
                     self.solution.events.append(
                         Event(time, "break-away", self.motion.resisted[k], float(np.sign(speed)))
                     )
                 senses[k] = int(np.sign(speed))
-        self.senses = tuple(senses)
+        self.mode = self.mode._replace(senses=tuple(senses))
 
     # ---- closed -----------------------------------------------------------------------------------------------
 
     def _let(self, time: float, onsets: tuple[Onset, ...]) -> None:
         """Tell which of the contacts that could be closed are."""
-        before, self.onsets = self._closed(), onsets
+        before = self._closed()
+        super()._let(time, onsets)
         for k in before:
             if onsets[k] is None and k in self._open:
                 self._end(k, time, 0.0)
@@ -361,12 +365,12 @@ class ImpactMotion(ActiveMotion):
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
         """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
         the nearest state in the sense of the masses."""
-        n, closed, at = self.layout.coordinates, self._closed(), self.moment(time, row, 0.0, 0.0)
+        n, closed, at = self.layout.coordinates, self._closed(), self.moment(time, row)
         linear = self.motion.linear(at)
         if shut := [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]:
             row[:n] -= nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
-        if closed and (stuck := [k for k, sense in enumerate(self.senses) if sense == 0]):
-            row[n : 2 * n] = self.motion.stopped(self.moment(time, row, 0.0, 0.0), stuck)
+        if closed and (stuck := [k for k, sense in enumerate(self.mode.senses) if sense == 0]):
+            row[n : 2 * n] = self.motion.stopped(self.moment(time, row), stuck)
         elif closed:
             still = [*closed, *(self.count + k for k in closed if self.onsets[k] == Closed(0))]
             rates = linear.driven + linear.ways @ row[n : 2 * n]
@@ -382,7 +386,7 @@ class ImpactMotion(ActiveMotion):
             solver.y = row.copy()
             solver.f = solver.fun(time, solver.y)
 
-    def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
+    def _cause(self, time: float, row: Array) -> str:
         """Why a state has no acceleration; empty if it has one."""
-        cause = super()._cause(time, row, sense, now)
+        cause = super()._cause(time, row)
         return "no_contact_force" if cause == "no_acceleration" and any(self.onsets) else cause

@@ -6,12 +6,12 @@ I, 2nd ed., Springer, 1993) or, where bristles make the equations stiff, LSODA (
 switched - the step ends, and the next begins from there, so that every step is taken through smooth forces. Such places
 are located on the dense output to rounding.
 
-One free coordinate whose friction is an interval at rest stays at rest while what drives it lies between the efforts at
-which it would break away forward and backward; see `rest`.
+What holds, slips and is open until then: see `active_motion`.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -25,11 +25,9 @@ from trunnion.algebra.dual import single
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
-from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.start import Places
-from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Onset
+from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
@@ -44,7 +42,7 @@ CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the durati
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
-LOOKS = 12  # times within a step at which one looks for what changes
+LOOKS, SCANNED = 12, 200  # times within a step, and within a rest, at which one looks for what changes
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 NEAR = 1e-8  # of the coordinate: places that are one
 SLIGHT = 1e-6  # of a typical acceleration: one that may be rounding
@@ -72,12 +70,12 @@ class Passing(NamedTuple):
 
 
 @dataclass
-class Integration:
+class Integration(ABC):
     """One motion from its initial state.
 
     progress: told the share of the duration that is reached; times: s, at which a load jumps or bends; evaluations: of
-    the forces, at most, a walk counted as WALK; onsets, senses: how contacts and joints that may stick are, see
-    `Moment`; start: time, s, at which it begins; duration: at which it ends.
+    the forces, at most, a walk counted as WALK; start: time, s, at which it begins; duration: at which it ends; mode:
+    what is so until something switches; resting: whether all free coordinates rest.
     """
 
     motion: FreeMotion
@@ -88,9 +86,9 @@ class Integration:
     progress: Callable[[float], None] | None = None
     times: Sequence[float] = ()
     evaluations: int = MOST_EVALUATIONS
-    onsets: tuple[Onset, ...] = ()
-    senses: tuple[int, ...] = ()
+    mode: Mode = field(default_factory=Mode)
     start: float = 0.0
+    resting: bool = False
 
     def __post_init__(self) -> None:
         self.layout, self.bends = Layout.of(self.motion), self.places.bends
@@ -98,12 +96,11 @@ class Integration:
         switch_times = [time for drive in self.motion.drives.values() for time in drive.times]
         times = {time for time in (*switch_times, *self.times) if self.start < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
-        self.turned_over, self.asked_for, self.slips, self.resting = 0.0, 0, 0.0, False
+        self.turned_over, self.asked_for = 0.0, 0
         self.last = self.start, np.empty(0)  # time and row from which it is to go on
         self._doubts = 0
         self.breaks = [*sorted(times), self.duration]
-        self.first_now = 0.5 * (self.start + self.breaks[0])
-        self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
+        self.mode = self.mode._replace(now=0.5 * (self.start + self.breaks[0]))
         self.ends = np.array([self.places.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         self._walked = self.motion.walked[0]
         self.guards = Guards(self.motion, self.layout, self.places.limits, self.dynamics.margins)
@@ -117,11 +114,10 @@ class Integration:
         return self.solution
 
     def _run(self, row: Array) -> None:
-        self._follow(self.start, row, 0.0, self.start)
+        self._follow(self.start, row)
         if not self._begins(row):
             return
         before, time, step, stayed = self.start - 1.0, self.start, None, 0
-        sense = float(np.sign(row[self.layout.coordinates])) if self.motion.rests else 0.0
         for _ in range(MOST_EVENTS):
             self.last = time, row
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
@@ -132,55 +128,56 @@ class Integration:
                 return
             k = next(k for k, time_of_break in enumerate(self.breaks) if time_of_break > time + CLOSE * self.duration)
             until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else self.start))
-            self._couple(time, row, now)
-            if self.solution.ended:
+            self.mode = self.mode._replace(now=now)
+            if not self._decided(time, row):
                 return
             try:
-                if self.rest is not None and row[self.layout.coordinates] == 0.0:
-                    sense = self.rest.sense(time, row, now)
-                    if sense == 0.0:
-                        time, row = self._rest(time, row, until, now)
-                        continue
-                    self._note(time, "break-away", sense)
-                time, row, step = self._move(time, row, until, sense, now, step)
+                time, row, step = self._move(time, row, until, step)
             except _Changed as change:
                 time, stretch = change.crossing.time, change.stretch
                 row = stretch.state(np.array([time]))[:, 0]
-                self._follow(time, row, stretch.sense, now)
+                self._follow(time, row)
                 step = min(self._changed(change.crossing, row), stretch.end - stretch.begin)
         self.end("events", time, {"count": float(MOST_EVENTS)})
 
-    def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
+    def moment(self, time: float, row: Array) -> Moment:
         """The state of a row."""
-        at = self.layout.moment(np.array([time]), row[:, None], sense, now, self.slips)
-        return at._replace(onsets=self.onsets, senses=self.senses)
+        return self.layout.moment(np.array([time]), row[:, None], self.mode)
 
-    # ---- rows that may hold, slip or be open: none of one free coordinate without a clutch --------------------------
+    # ---- what holds, slips or is open: see `active_motion` ---------------------------------------------------------
 
-    def _couple(self, time: float, row: Array, now: float) -> None:
-        """Find how they are from here on; `row` is what it is after it."""
+    @abstractmethod
+    def _decided(self, time: float, row: Array) -> bool:
+        """Find the mode from here on; `row` is what it is after it. Whether there is one."""
 
+    @abstractmethod
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
-        """By time what stays above 0 within a step until one of them changes, (row, time); None: there are none."""
-        return None
+        """By time what stays above 0 within a step while its mode lasts, (number, time); None: there is nothing."""
 
+    @abstractmethod
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """Let one change, and `row` with it; how long the first step after it may be, s."""
-        raise NotImplementedError
 
-    def _end_step(self, solver: OdeSolver, row: Array) -> None:
+    @abstractmethod
+    def _measured(self, stretch: Stretch) -> None:
+        """What contacts come to in a step."""
+
+    def _end_step(self, solver: OdeSolver, row: Array) -> None:  # noqa: B027 (what is closed needs it)
         """What they need at the end of a step."""
 
     def _begins(self, row: Array) -> bool:
         """Whether there are accelerations at the start; they also tell what rates are typical."""
-        n, now, start = self.layout.coordinates, self.first_now, self.start
-        if self.rest is not None and row[n] == 0.0:
-            if self._assembled(self.moment(start, row, 1.0, now)):
-                return True
-            self._stop("not_assembled", start, row)
-            return False
-        sense = float(np.sign(row[n])) if self.motion.rests else 0.0
-        at = self.moment(start, row, sense, now)
+        n, start = self.layout.coordinates, self.start
+        if self.motion.several:
+            if not self._decided(start, row):
+                return False
+        elif self.motion.resisted:
+            if row[n] == 0.0:
+                if not (assembled := self._assembled(self.moment(start, row))):
+                    self._stop("not_assembled", start, row)
+                return assembled
+            self.mode = self.mode._replace(senses=(int(np.sign(row[n])),))
+        at = self.moment(start, row)
         with np.errstate(all="ignore"):
             second = self.dynamics(at).second
             if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
@@ -188,8 +185,8 @@ class Integration:
                 second = self.dynamics(at._replace(q=ahead)).second
                 self.bends = (*self.bends, float(row[0] % self.places.period if self.places.period else row[0]))
         if not np.all(np.isfinite(second)):
-            cause = self._cause(start, row, sense, now) or "no_acceleration"
-            if self._locked(start, row, sense, now, [cause]):
+            cause = self._cause(start, row) or "no_acceleration"
+            if self._locked(start, row, [cause]):
                 return True
             self._stop(cause, start, row)
             return False
@@ -202,11 +199,13 @@ class Integration:
     def _note(self, time: float, kind: str, figure: float = np.nan, unit: str = "") -> None:
         self.solution.events.append(Event(time, kind, self.motion.names[0], figure, unit))
 
-    def _add(self, stretch: Stretch) -> None:
-        """Add a step, up to where a row changes or the motion ends in it."""
-        stretches, full, crossing = self.solution.stretches, stretch, None
+    def _add(self, begin: float, end: float, state: Callable[[Array], Array]) -> None:
+        """Add a step, up to where its mode changes or the motion ends in it."""
+        full = stretch = Stretch(begin, end, state, self.mode, self.resting, self.snapshot)
+        stretches, crossing = self.solution.stretches, None
         if values := self._values(stretch):
-            times = np.linspace(stretch.begin, stretch.end, LOOKS + 1)[1:]
+            looks = SCANNED if stretch.resting and not self.motion.several else LOOKS
+            times = np.linspace(stretch.begin, stretch.end, looks + 1)[1:]
             crossing = first_crossing(values, stretch.begin, times)
         if crossing is not None:
             stretch = stretch._replace(end=crossing.time)
@@ -227,57 +226,30 @@ class Integration:
         if crossing is not None:
             raise _Changed(crossing, full)
 
-    def _step(self, begin: float, end: float, state: Callable[[Array], Array], sense: float, now: float) -> None:
-        """Add a step that was integrated."""
-        rows = self.onsets, self.senses, self.slips
-        self._add(Stretch(begin, end, state, sense, self.resting, now, self.snapshot, *rows))
-
-    def _measured(self, stretch: Stretch) -> None:
-        """What contacts come to in a step: nothing, where there are none."""
-
     @property
     def snapshot(self) -> Snapshot | None:
         """From which the assembly goes on; None where it is not followed."""
         return self.motion.followed[0].snapshot if self.motion.followed else None
 
-    def _follow(self, time: float, row: Array, sense: float, now: float) -> None:
+    def _follow(self, time: float, row: Array) -> None:
         with np.errstate(all="ignore"):
-            self.motion.step(self.moment(time, row, sense, now))
-
-    # ---- at rest ----------------------------------------------------------------------------------------------
-
-    def _rest(self, time: float, row: Array, until: float, now: float) -> tuple[float, Array]:
-        """Stay until what drives it leaves the interval, or the next break."""
-        assert self.rest is not None
-        if not self.solution.stretches or not self.solution.stretches[-1].resting:
-            self._note(time, "rest")
-        rest, end = self.rest, self.rest.until(time, row, until, now)
-        meanwhile = rest.meanwhile(time, row, end, now)
-
-        def held(moments: Array) -> Array:
-            rows = rest.held(time, row, moments)
-            if meanwhile:
-                self.layout.works(rows)[: len(WORKS)] += meanwhile(moments)
-            return rows
-
-        self._add(Stretch(time, end, held, 0.0, True, now, slips=self.slips))
-        return end, held(np.array([end]))[:, 0]
+            self.motion.step(self.moment(time, row))
 
     # ---- in motion --------------------------------------------------------------------------------------------
 
-    def _move(
-        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
-    ) -> tuple[float, Array, float | None]:
-        """Move until the next place where a force jumps or bends, a rest, or the next break."""
+    def _move(self, time: float, row: Array, until: float, step: float | None) -> tuple[float, Array, float | None]:
+        """Move, or rest, until the next place where a force jumps or bends, a rest, or the next break."""
         n = self.layout.coordinates
-        between = self._place(float(row[0]), sense or float(np.sign(row[n])))
-        rate = self._rate(sense, now, between)
+        between = self._place(float(row[0]), self.sense or float(np.sign(row[n])))
+        rate = self._rate(between)
         if row[n] == 0.0 and row[0] in self.ends[:, 0]:
             outward = np.sign(row[0] - np.mean(self.ends[:, 0])) * rate(time, row)[n]
             if outward > SLIGHT * self.motion.unit[0]:  # else it is rounding, or ends by the steps that follow
                 self._end_at(time, float(row[0]))
                 return time, row, None
         first = min(step, 0.5 * (until - time)) if step else None
+        if self.motion.stays(self.moment(time, row)):
+            first = until - time
         absolute, marks = self._absolute(row), [time]
         solver = self._solver(rate, time, row, until, absolute, first)
         dead_centre = DeadCentre(self.motion, self.layout)
@@ -285,52 +257,56 @@ class Integration:
             before, row = float(solver.t), np.array(solver.y)
             marks.append(before)
             if any(len(marks) > k and before - marks[-k] < crept * self.duration for k, crept in CREEPING):
-                return self._failed(before, row, sense, now, "")
+                return self._failed(before, row)
             size = float(getattr(solver, "h_abs", None) or solver.step_size or 0.0)  # of the step that comes
             near = self._near(row, between, min(size, until - before), rate, before)
-            solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)
+            solver = solver if near else self._stepped(solver, rate, absolute)
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
-                return self._failed(before, row, sense, now, failed)
+                return self._failed(before, row)
             if near is None and (end := self._left_range(row, np.array(solver.y))) is not None:
                 self._end_at(before, end)
                 return before, row, None
-            passed = near or self._passed(row, np.array(solver.y), sense, between)
+            passed = near or self._passed(row, np.array(solver.y), between)
             if passed is not None and passed.number == 0 and row[n] == 0.0:  # from rest: nearer first
                 size = 0.25 * (float(solver.t) - before)
                 solver = self._solver(rate, before, row, until, self._absolute(row), size)
                 continue
             if passed is not None:
                 last = float(solver.step_size or 0.0)
-                return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
-            self._step(before, float(solver.t), solver.dense_output(), sense, now)
-            self._follow(float(solver.t), np.array(solver.y), sense, now)
+                return (*self._approach(before, row, passed, until, rate), last or None)
+            self._add(before, float(solver.t), solver.dense_output())
+            self._follow(float(solver.t), np.array(solver.y))
             self._end_step(solver, np.array(solver.y))
-            self._compare(before, row, sense, now)
+            self._compare(before, row)
             if event := dead_centre.reached(solver, float(solver.t) - before):
                 self._turns_round(*event)
                 break
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
-    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
+    @property
+    def sense(self) -> int:
+        """Of the motion of one free coordinate that may rest; else 0."""
+        return self.mode.senses[0] if self.mode.senses and not self.motion.several else 0
+
+    def _rate(self, between: tuple[float, float]) -> Callable[[float, Array], Array]:
         """The derivative of a row by time, within one stretch: nothing beyond its ends is asked for."""
-        n, one_way = self.layout.coordinates, len(self.motion.names) == 1
+        n, sense = self.layout.coordinates, self.sense
         low, high = (end + side * self._inside(end) for end, side in zip(between, (1.0, -1.0), strict=True))
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
             speeds = numbers[n : 2 * n]
             numbers_asked = numbers.copy()
-            if not one_way:
+            if self.motion.several:
                 if self.places.limits:  # no force may be known beyond
                     numbers_asked[:n] = np.clip(numbers[:n], *self.ends)
             else:
                 numbers_asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
                     numbers_asked[n] = 0.0
-            at = self.moment(moment, numbers_asked, sense, now)
             with np.errstate(all="ignore"):
-                rates = self.dynamics(at)
-            return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
+                second, others, sound, _ = self.dynamics(self.moment(moment, numbers_asked))
+            return np.concatenate([speeds, second, others]) if sound else np.full(len(numbers), np.nan)
 
         return rate
 
@@ -349,18 +325,17 @@ class Integration:
             first = 1e-12 * abs(end - begin)  # SciPy would look for one without end; so the first step fails
         return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first)
 
-    def _stepped(
-        self, solver: OdeSolver, rate: Callable[[float, Array], Array], absolute: Array
-    ) -> tuple[OdeSolver, str | None]:
-        """One step, and why there is none. LSODA does not get over an unknown rate: it begins anew, shorter."""
-        begin, state, failed = float(solver.t), np.array(solver.y), solver.step()
+    def _stepped(self, solver: OdeSolver, rate: Callable[[float, Array], Array], absolute: Array) -> OdeSolver:
+        """One step. LSODA does not get over an unknown rate: it begins anew, shorter."""
+        begin, state = float(solver.t), np.array(solver.y)
+        solver.step()
         for k in range(1, RETRIES + 1 if self.motion.bristles else 0):
             if solver.status != "failed" and np.all(np.isfinite(solver.y)):
                 break
             end = float(solver.t_bound)
             solver = self._solver(rate, begin, state, end, absolute, 0.01**k * abs(end - begin))
-            failed = solver.step()
-        return solver, failed
+            solver.step()
+        return solver
 
     def _near(
         self, row: Array, between: tuple[float, float], step: float, rate: Callable[[float, Array], Array], time: float
@@ -384,10 +359,10 @@ class Integration:
                 return float(end)
         return None
 
-    def _passed(self, before: Array, after: Array, sense: float, between: tuple[float, float]) -> Passing | None:
+    def _passed(self, before: Array, after: Array, between: tuple[float, float]) -> Passing | None:
         """What a step has passed: the speed 0, or else a bend; the step is then taken anew, up to it."""
         n = self.layout.coordinates
-        if sense and sense * after[n] <= 0.0:
+        if self.sense and self.sense * after[n] <= 0.0:
             return Passing(n, 0.0)
         if len(self.motion.names) == 1:
             low, high = self.ends[:, 0]
@@ -400,9 +375,8 @@ class Integration:
         return None
 
     def _approach(
-        self, time: float, row: Array, to: Passing, until: float, sense: float, now: float,
-        rate: Callable[[float, Array], Array],
-    ) -> tuple[float, Array]:  # fmt: skip
+        self, time: float, row: Array, to: Passing, until: float, rate: Callable[[float, Array], Array]
+    ) -> tuple[float, Array]:
         """Move exactly to where a number of the state has a value: that number takes the place of the time.
 
         M. Hénon, On the numerical computation of Poincaré maps, Physica D 5 (1982) 412-414,
@@ -414,7 +388,7 @@ class Integration:
         def by_number(value: float, numbers: Array) -> Array:
             state = numbers.copy()
             moment, state[k] = float(numbers[k]), value
-            if k == 0 and sense and sense * state[n] <= 0.0:
+            if k == 0 and self.sense and self.sense * state[n] <= 0.0:
                 return np.full_like(state, np.nan)  # it turns round before
             numbers_at = rate(moment, state)
             pace = numbers_at[k]
@@ -435,20 +409,23 @@ class Integration:
         solver = self._solver(by_number, begin, state, to.value, absolute)
         while solver.status == "running":
             last, last_row = float(solver.t), np.array(solver.y)
-            solver, failed = self._stepped(solver, by_number, absolute) if last == begin else (solver, solver.step())
+            if last == begin:
+                solver = self._stepped(solver, by_number, absolute)
+            else:
+                solver.step()
             wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), last_row.copy()
             before[k] = last
             if wrong and k == 0 and before[n] != 0.0:  # it turns round before the place
-                return self._approach(float(last_row[k]), before, Passing(n, 0.0), until, sense, now, rate)
+                return self._approach(float(last_row[k]), before, Passing(n, 0.0), until, rate)
             if wrong:
-                return self._failed(float(last_row[k]), before, sense, now, failed)[:2]
+                return self._failed(float(last_row[k]), before)[:2]
             if solver.y[k] > until:
-                return self._plain(float(last_row[k]), before, until, sense, now, rate)
+                return self._plain(float(last_row[k]), before, until, rate)
             along = by_time(solver.dense_output(), last, float(solver.t), k)
-            self._step(float(last_row[k]), float(solver.y[k]), along, sense, now)
+            self._add(float(last_row[k]), float(solver.y[k]), along)
         numbers_at = np.array(solver.y)
         end, numbers_at[k] = float(numbers_at[k]), to.value
-        self._follow(end, numbers_at, sense, now)
+        self._follow(end, numbers_at)
         if k == 0:
             self._end_at(end, to.value)
         return end, numbers_at
@@ -470,16 +447,16 @@ class Integration:
         return None
 
     def _plain(
-        self, time: float, row: Array, until: float, sense: float, now: float, rate: Callable[[float, Array], Array]
+        self, time: float, row: Array, until: float, rate: Callable[[float, Array], Array]
     ) -> tuple[float, Array]:
         """Up to a break in time that comes before the place is reached."""
         solver = self._solver(rate, time, row, until, self._absolute(row))
         while solver.status == "running":
             before = float(solver.t)
-            failed = solver.step()
+            solver.step()
             if solver.status == "failed":
-                return self._failed(before, np.array(solver.y), sense, now, failed)[:2]
-            self._step(before, float(solver.t), solver.dense_output(), sense, now)
+                return self._failed(before, np.array(solver.y))[:2]
+            self._add(before, float(solver.t), solver.dense_output())
         return float(solver.t), np.array(solver.y)
 
     def _absolute(self, row: Array) -> Array:
@@ -494,7 +471,7 @@ class Integration:
         self.turned_over = max(self.turned_over, float(np.max(np.abs(row[-len(self.layout.works_named) :]))))
         self.asked_for += 1
         if self.asked_for & (self.asked_for - 1) == 0:  # the 1st, 2nd, 4th … time: energy may be large and no work done
-            self.turned_over = max(self.turned_over, self._kinetic(self.start, row, 0.0, self.start))
+            self.turned_over = max(self.turned_over, self._kinetic(self.start, row))
         # at the start nothing is turned over: the works follow the motion then
         tolerances[-len(self.layout.works_named) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
         return tolerances
@@ -515,19 +492,16 @@ class Integration:
             high = min(high, above[0]) if len(above) else high
         return low, high
 
-    def _failed(
-        self, time: float, row: Array, sense: float, now: float, message: str | None
-    ) -> tuple[float, Array, None]:
+    def _failed(self, time: float, row: Array) -> tuple[float, Array, None]:
         """Say why there is no next step; a linkage that locks as it runs stops."""
         n, row, soon = self.layout.coordinates, row.copy(), AHEAD / float(np.max(self.pace))
         ahead, later = row.copy(), row.copy()
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
         later[:n] += soon * row[n : 2 * n]
-        states = ((time, row), (time, ahead), (time + soon, later))
-        causes = [self._cause(when, state_at, sense, now) for when, state_at in states]
-        if self._locked(time, row, sense, now, causes):
+        causes = [self._cause(*state) for state in ((time, row), (time, ahead), (time + soon, later))]
+        if self._locked(time, row, causes):
             return time, row, None
-        code = next((state_at for state_at in causes if state_at), "step")
+        code = next(filter(None, causes), "step")
         if code == "not_assembled" and not causes[0] and len(self.motion.names) == 1:  # it can be assembled until then
             self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
         else:
@@ -539,39 +513,43 @@ class Integration:
         self._note(time, "dead-centre")
         self.end("dead_centre", time, figures)
 
-    def _locked(self, time: float, row: Array, sense: float, now: float, causes: Sequence[str]) -> bool:
+    def _locked(self, time: float, row: Array, causes: Sequence[str]) -> bool:
         """Let the one free coordinate stop at once, as friction holds it: it has no solution, or it grows faster with
         the acceleration against the motion than what brakes it."""
         n = self.layout.coordinates
-        if self.rest is None or row[n] == 0.0:
+        if self.motion.several or not self.motion.resisted or row[n] == 0.0:
             return False
         if "locked" not in causes:
-            along, against = self.motion.growth(self.moment(time, row, sense, now))[:: int(np.sign(row[n]))]
+            along, against = self.motion.growth(self.moment(time, row))[:: int(np.sign(row[n]))]
             if "no_acceleration" not in causes or not against <= 0.0 < along:
                 return False
-        self._note(time, "lock", self._stopped(time, row, np.zeros(n), sense, now), "J")
+        self._note(time, "lock", self._stopped(time, row, np.zeros(n)), "J")
         return True
 
-    def _compare(self, time: float, row: Array, sense: float, now: float) -> None:
+    def _compare(self, time: float, row: Array) -> None:
         """Tell where there are several accelerations, every few steps: E − T, which is continuous, has other roots than
         that which is followed where its determinant changes its sign far out."""
-        if self.motion.affine or 0 in self.senses or SEVERAL in self.solution.notes:
+        if self.motion.affine or 0 in self.mode.senses or SEVERAL in self.solution.notes:
             return
         self._doubts += 1
-        if self._doubts % LOOKED == 1 and np.any(self.motion.growth(self.moment(time, row, sense, now)) < 0.0):
+        if self._doubts % LOOKED == 1 and np.any(self.motion.growth(self.moment(time, row)) < 0.0):
             self.solution.notes[SEVERAL] = {"time": time}
 
-    def _stopped(self, time: float, row: Array, rates: Array, sense: float, now: float) -> float:
-        """Change rates at once, by friction: the energy lost, J, of rotors too, which is work of friction."""
+    def _stopped(self, time: float, row: Array, rates: Array) -> float:
+        """Change rates at once, by friction: the energy lost, J, of rotors too, which is work of friction. That behind
+        a clutch keeps its speed."""
         n, works = self.layout.coordinates, self.layout.size - len(self.layout.works_named)
-        before, rates_before = self._kinetic(time, row, sense, now), row[n : 2 * n].copy()
+        before, rates_before = self._kinetic(time, row), row[n : 2 * n].copy()
+        if self.layout.clutched:
+            (drive,) = self.motion.drives.values()
+            row[self.layout.slip] += drive.ratio * (rates_before[0] - rates[0])
         rotors = sum(
             0.5 * drive.inertia * drive.ratio**2 * (old * old - new * new)
             for drive, old, new in zip(self.motion.drives.values(), rates_before, rates, strict=True)
             if not drive.clutched
         )
         row[n : 2 * n] = rates
-        lost = before - self._kinetic(time, row, sense, now) + float(rotors)
+        lost = before - self._kinetic(time, row) + float(rotors)
         row[works + WORKS.index("drive")] += float(rotors)
         row[works + WORKS.index("friction")] += lost
         return lost
@@ -580,14 +558,14 @@ class Integration:
         figures = {"coordinate": float(row[0]), "rate": float(row[self.layout.coordinates])}
         if code in ("no_acceleration", "locked"):
             with np.errstate(all="ignore"):
-                growth = float(np.min(self.motion.growth(self.moment(time, row, 0.0, time))))
+                growth = float(np.min(self.motion.growth(self.moment(time, row))))
             code = "no_acceleration" if growth <= 0.0 else "unsolved"
             figures |= {"growth": growth} if growth <= 0.0 else {}
         self.end(code, time, figures)
 
-    def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
+    def _cause(self, time: float, row: Array) -> str:
         """Why a state has no acceleration; empty if it has one."""
-        at = self.moment(time, row, sense, now)
+        at = self.moment(time, row)
         if not self._assembled(at):
             return "not_assembled"
         with np.errstate(all="ignore"):
@@ -599,6 +577,6 @@ class Integration:
             status = pose_status(self.motion.walk(at, np.zeros_like(at.q)), (1,))
         return int(status[0]) != Status.NOT_ASSEMBLED
 
-    def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
-        at = self.moment(time, row, sense, now)
+    def _kinetic(self, time: float, row: Array) -> float:
+        at = self.moment(time, row)
         return single(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))

@@ -111,26 +111,15 @@ class Drive:
         spin: Array = (shaft - self.carried(now, slips)) / self.inertia
         return spin
 
-    def waiting(self, since: Array, integral: Array, now: float) -> Array:
-        """The controller's integral after a time at rest, s."""
-        if self.motor is None or self.motor.of.at_rest is None or now >= self.off_from:
-            return integral + 0.0 * since
-        return self.motor.of.at_rest(since, self.parameters, integral)
+    def effort(self, time: Array, speed: Array, second: Array, integral: Array, now: float, share: Any = None) -> Array:
+        """Effort on the coordinate, less what the rotor takes to be accelerated, and less the brake.
 
-    def effort(
-        self, time: Array, speed: Array, second: Array, integral: Array, now: float, sense: float = 0.0
-    ) -> Array:
-        """Effort on the coordinate, less what the rotor takes to be accelerated; second: of the coordinate.
-
-        sense: of the motion about to begin where the speed is 0, by which the loss in the gear goes.
+        second: of the coordinate; share: of the losses in the gear and of the brake, ±1 in motion in that sense, less
+        at rest; by the speed, without the brake, if not given.
         """
         free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
-        return transmitted(free, np.where(speed != 0.0, speed, sense), self.ratio, self.efficiency) + self.applied
-
-    def resisted(self, time: Array, speed: Array, second: Array, integral: Array, now: float, share: Any) -> Array:
-        """Effort as of `effort`, less the brake: full losses of a motion in the sense of a share of ±1, a share of them
-        in between, at rest."""
-        free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
+        if share is None:
+            return transmitted(free, speed, self.ratio, self.efficiency) + self.applied
         ahead, back = (transmitted(free, np.asarray(sense), self.ratio, self.efficiency) for sense in (1.0, -1.0))
         effort: Array = 0.5 * ((1.0 + share) * ahead + (1.0 - share) * back) - share * self.braking(now)
         return effort + self.applied

@@ -16,12 +16,11 @@ import numpy as np
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.active_motion import ActiveMotion
-from trunnion.dynamics.clutch_motion import ClutchMotion
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics, Rates
 from trunnion.dynamics.start import Places, load_times
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.solve.change_points import carried_on
 from trunnion.solve.system import felt
 
@@ -53,13 +52,11 @@ class Bridged:
         if not abs(nearest) < self.width:
             return self.inner(at)
         about = [self.inner(at._replace(q=at.q - nearest + place * self.width)) for place in PLACES]
-        columns = [
-            carried_on(self.width * PLACES, np.array([getattr(state, key) for state in about], float).T, nearest)
-            for key in ("second", "integral", "bristles", "works", "slip")
-        ]
-        second, integral, bristles, works, slip = columns
-        sound, locked = all(state.sound for state in about), any(state.locked for state in about)
-        return Rates(second, integral, bristles, works, sound, locked, slip)
+        second, others = (
+            carried_on(self.width * PLACES, np.array(numbers, float).T, nearest)
+            for numbers in ([state.second for state in about], [state.others for state in about])
+        )
+        return Rates(second, others, all(state.sound for state in about), any(state.locked for state in about))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.inner, name)
@@ -90,15 +87,11 @@ CYCLES = 10  # of the nominal motion: the duration if none is stated
 def integration_of(
     motion: FreeMotion, rates: Dynamics, load_places: Places, duration: float, tolerance: float,
     progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS, start: float = 0.0,
-    senses: tuple[int, ...] = (),
+    mode: Mode | None = None,
 ) -> Integration:  # fmt: skip
-    """What integrates a motion. duration, evaluations, start, senses: see `Integration`."""
-    contacts, kind = motion.contacts.each, Integration
-    if motion.resisted or contacts:
-        kind = ImpactMotion if any(contact.rigid for contact in contacts) else ActiveMotion
-    elif any(drive.clutched for drive in motion.drives.values()):
-        kind = ClutchMotion
+    """What integrates a motion. duration, evaluations, start, mode: see `Integration`."""
+    kind = ImpactMotion if any(contact.rigid for contact in motion.contacts.each) else ActiveMotion
     return kind(
         motion, bridged(motion, rates), duration, tolerance, load_places, progress, load_times(motion, duration),
-        evaluations, senses=senses, start=start,
+        evaluations, mode or Mode(), start,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.dynamics.touching import Closed, Contacts
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, Motion
@@ -32,18 +33,15 @@ CLUTCH = "clutch"  # lost in a clutch that slips
 
 
 class Rates(NamedTuple):
-    """Second derivatives (coordinate,), rates of the controllers' integrals (coordinate,), of the deflections
-    (bristle,), of the works, W, and of a clutch's slip, if there is one. sound: whether there is one acceleration;
-    locked: whether friction has no solution.
+    """Second derivatives (coordinate,), and after them the rates of what `Layout` has: of the controllers' integrals,
+    deflections, a clutch's slip and works. sound: whether there is one acceleration; locked: whether friction has no
+    solution.
     """
 
     second: Array
-    integral: Array
-    bristles: Array
-    works: Array
+    others: Array
     sound: bool
     locked: bool = False
-    slip: Array = np.empty(0)
 
 
 class Seen(NamedTuple):
@@ -97,28 +95,15 @@ class Layout(NamedTuple):
     def size(self) -> int:
         return self.slip + self.clutched + len(self.works_named)
 
-    def moment(
-        self, time: Array, rows: Array, sense: float = 0.0, now: float = 0.0, slips: float = 0.0
-    ) -> Moment:  # fmt: skip
+    def moment(self, time: Array, rows: Array, mode: Mode | None = None) -> Moment:
         """The state of lanes, (number, lane)."""
         n, slip = self.coordinates, self.slip
-        return Moment(
-            time, rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n : slip], sense, now,
-            slip=rows[slip : slip + self.clutched], slips=slips,
-        )  # fmt: skip
+        numbers = rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n : slip], rows[slip : slip + self.clutched]
+        return Moment(time, *numbers, *(mode or Mode()))
 
     def works(self, rows: Array) -> Array:
         """The works, (work, lane)."""
         return rows[self.slip + self.clutched :]
-
-    def rates(self, numbers: Array, sound: bool = True, locked: bool = False) -> Rates:
-        """Rates from second derivatives and what `beside` tells, one after the other."""
-        n, memory = self.coordinates, 2 * self.coordinates + self.bristles
-        return Rates(numbers[:n], numbers[n : 2 * n], numbers[2 * n : memory], numbers[memory:], sound, locked)
-
-    def row(self, rate: Array, rates: Rates) -> Array:
-        """The derivative of a row."""
-        return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.slip, rates.works])
 
 
 class Walks:
@@ -127,12 +112,16 @@ class Walks:
     def __init__(self, motion: FreeMotion) -> None:
         self.motion, self.layout = motion, Layout.of(motion)
         self._last: Array | None = None
+        self._unknown = np.full(self.layout.size - 2 * self.layout.coordinates, np.nan)
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
         motion = self.motion
         if not (np.all(np.isfinite(at.q)) and np.all(np.isfinite(at.rate))):  # of a step one of whose rates is unknown
-            return self.layout.rates(np.full(self.layout.size - self.layout.coordinates, np.nan), False)
+            return Rates(np.full(self.layout.coordinates, np.nan), self._unknown, False)
+        if motion.stays(at):
+            nothing = np.zeros(self.layout.coordinates)
+            return Rates(nothing, np.array(list(map(single, beside(motion, at, nothing, None)))), True)
         accelerated = motion.accelerate(at, self._last)
         if self._last is not None and not np.all(accelerated.converged & ~accelerated.turned):
             accelerated = motion.accelerate(at)  # the last may lie on the wrong side of where a reaction turns round
@@ -140,13 +129,13 @@ class Walks:
             self._last = accelerated.second
         sound = bool(np.all(accelerated.converged & ~accelerated.turned))
         locked = any(bool(np.any(np.less(settled.share, 1.0))) for settled in accelerated.back.settled)
-        others = beside(motion, at._replace(onsets=accelerated.onsets), accelerated.back)
-        numbers = np.array([*accelerated.second[:, 0], *map(single, others)])
-        return self.layout.rates(numbers, sound, locked)
+        second = accelerated.second[:, 0]
+        others = beside(motion, at._replace(onsets=accelerated.onsets), second, accelerated.back)
+        return Rates(second, np.array(list(map(single, others))), sound, locked)
 
     def seconds(self, at: Moment) -> Array:
         """See `Dynamics`."""
-        return self.motion.accelerate(at).second
+        return np.zeros_like(at.q) if self.motion.stays(at) else self.motion.accelerate(at).second
 
     def margins(self, at: Moment) -> Array:
         """See `Dynamics`."""
@@ -167,16 +156,30 @@ class Walks:
         return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
 
 
-def beside(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
-    """Rates of the controllers' integrals, of the deflections of bristles, ż = v − d(v) z, m/s, and of the works, W."""
-    drives: Any = enumerate(motion.drives.values())
-    rates: list[Number] = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
+def beside(motion: FreeMotion, at: Moment, second: Sequence[Number] | Array, back: Backward | None) -> list[Number]:
+    """Rates of the controllers' integrals, of the deflections of bristles, ż = v − d(v) z, m/s, of the slip of a
+    clutch, and of the works, W. back: the forces; None while everything rests."""
+    errors, slips, lost = list[Number](), list[Number](), list[Number]()
+    works = [0.0] * len(WORKS) if back is None else works_of(back, at, motion.contacts)
+    for i, drive in enumerate(motion.drives.values()):
+        speed: Any = at.rate[i]
+        if drive.loose(at.now, at.slips):
+            rotor: Any = at.slip[0] + drive.ratio * at.rate[i]
+            speed = rotor / drive.ratio
+            spin = drive.spin(at.time, rotor, at.integral[i], at.now, at.slips)
+            slips.append(spin - drive.ratio * second[i])
+            lost.append(drive.carried(at.now, at.slips) * at.slip[0])
+            works[0] = works[0] + lost[0]  # the motor's, of which the joint gets the rest
+        elif drive.clutched:
+            slips, lost = [0.0], [0.0]
+        errors.append(drive.error(at.time, speed, at.integral[i], at.now))
+    bristles = list[Number]()
     for joint, deflection in zip(motion.bristles, at.bristles, strict=True):
-        law, slip = law_of(motion.system, joint), primal(back.contacts[joint][0].slip)
+        law, slip = law_of(motion.system, joint), 0.0 if back is None else primal(back.contacts[joint][0].slip)
         assert law.relaxation is not None  # or it would have no bristles
         decay = law.relaxation(slip, **law_parameters(law, motion.values, joint))
-        rates.append(slip - decay * deflection)
-    return [*rates, *works_of(back, at, motion.contacts)]
+        bristles.append(slip - decay * deflection)
+    return [*errors, *bristles, *slips, *works, *lost]
 
 
 def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Layout
-from trunnion.dynamics.touching import Onset
+from trunnion.dynamics.state import Mode, Moment
 
 __all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch", "by_time"]
 
@@ -51,20 +51,20 @@ class Impact(NamedTuple):
 class Stretch(NamedTuple):
     """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
 
-    sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
-    goes on, where it is followed; onsets, senses, slips: of contacts, joints that may stick and a clutch, see `Moment`.
+    mode: what is so all the while; resting: whether all free coordinates rest; snapshot: from which the assembly goes
+    on, where it is followed.
     """
 
     begin: float
     end: float
     state: Callable[[Array], Array]
-    sense: float
-    resting: bool
-    now: float
+    mode: Mode
+    resting: bool = False
     snapshot: Snapshot | None = None
-    onsets: tuple[Onset, ...] = ()
-    senses: tuple[int, ...] = ()
-    slips: float = 0.0
+
+    def at(self, layout: Layout, time: Array) -> Moment:
+        """The moments of some times, s."""
+        return layout.moment(time, np.asarray(self.state(time)), self.mode)
 
 
 class Ended(NamedTuple):

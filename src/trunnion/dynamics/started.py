@@ -50,17 +50,17 @@ class DriveCourse:
     @classmethod
     def of(cls, motion: FreeMotion, solution: Solution, i: int) -> DriveCourse:
         """That of one free coordinate."""
-        steps, n = list[Array](), solution.layout.coordinates
+        steps = list[Array]()
         for stretch in solution.stretches:
             half = 0.5 * (stretch.end - stretch.begin)
             if not half > 0.0:
                 continue
             time = stretch.begin + half * (1.0 + NODES)
-            rows = stretch.state(time)
-            second = rows[n : 2 * n] @ _DERIVED.T / half
-            at = solution.layout.moment(time, rows, stretch.sense, stretch.now, stretch.slips)
-            effort = motion.given(at, 0.0 * second if stretch.resting else second)[i]
-            steps.append(np.array([time, rows[i], rows[n + i], effort]))
+            at = stretch.at(solution.layout, time)
+            second = at.rate @ _DERIVED.T / half
+            senses = {} if motion.rests(at) else motion.senses(at)
+            effort = motion.given(at, 0.0 * second if stretch.resting else second, senses)[i]
+            steps.append(np.array([time, at.q[i], at.rate[i], effort]))
         return cls(*np.stack(steps or [np.zeros((4, len(NODES)))], axis=1))
 
     @cached_property

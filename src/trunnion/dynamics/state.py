@@ -31,26 +31,40 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Moment", "repeated"]
+__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Mode", "Moment", "repeated"]
 
 Array = NDArray[np.float64]
+Senses = dict[str, Sense]  # by joint
+Pattern = dict[str, tuple[int, Sense]]  # by joint, see `FreeMotion.pattern`
 
 ROUNDS = 30  # of Newton's method
 SETTLED = 1e-11  # of the largest acceleration: where it ends
+HALVINGS = 20  # of a step at rest whose end is no place
 HELD = 1e-8  # of the largest: what is solved may miss as much
 FAR = 1e3  # times what is typical: an acceleration beyond which the step of the derivative was too short
 BEYOND = 1e6  # times what is typical: an acceleration at which inertia is all there is
 DIFFERENCE = 1e-4  # of the acceleration, by which the derivative is taken where E is not affine
 
 
+class Mode(NamedTuple):
+    """What is so until something switches.
+
+    now: a time within the stretch, s, which says what is switched on; onsets: of each contact of joints in play its
+    speed of approach, m/s, None while it does not touch; senses: in which each joint of `FreeMotion.resisted` slides,
+    +1 or −1, 0 where it sticks; empty: nothing resists, or it is as the speeds say; slips: sense in which the clutch
+    slips, +1 or −1, 0 while it holds or is open.
+    """
+
+    now: float = 0.0
+    onsets: tuple[Onset, ...] = ()
+    senses: tuple[int, ...] = ()
+    slips: float = 0.0
+
+
 class Moment(NamedTuple):
     """The state of some lanes: time, s, coordinates and rates (coordinate, lane), controllers' integrals likewise,
-    deflections of bristles (bristle, lane), m. sense: of the motion where the speed is 0, +1 or −1, of one coordinate;
-    now: a time within the stretch, which says what is switched on; onsets: of each contact of joints in play its speed
-    of approach, m/s, None while it does not touch; senses: where several coordinates are free, in which sense each
-    joint of `FreeMotion.resisted` slides, +1 or −1, 0 where it sticks; empty: it is as the speeds say. slip: speed of
-    the rotor behind a clutch less that of the joint through the gear, (1, lane), rad/s or m/s; slips: sense in which
-    the clutch slips, +1 or −1, 0 while it holds or is open.
+    deflections of bristles (bristle, lane), m; slip: speed of the rotor behind a clutch less that of the joint through
+    the gear, (1, lane), rad/s or m/s; then what `Mode` has.
     """
 
     time: Array
@@ -58,11 +72,10 @@ class Moment(NamedTuple):
     rate: Array
     integral: Array
     bristles: Array
-    sense: float = 0.0
+    slip: Array = np.empty((0, 1))
     now: float = 0.0
     onsets: tuple[Onset, ...] = ()
     senses: tuple[int, ...] = ()
-    slip: Array = np.empty((0, 1))
     slips: float = 0.0
 
 
@@ -174,20 +187,30 @@ class FreeMotion:
         return tuple(sticking(self.system))
 
     @cached_property
+    def several(self) -> bool:
+        """Whether several coordinates are free."""
+        return len(self.names) > 1
+
+    @cached_property
     def resisted(self) -> tuple[str, ...]:
-        """Where several coordinates are free: joints that may stick, by friction, loads, brakes or losses of gears."""
-        if len(self.names) == 1:
-            return ()
-        resisting = {name for name, drive in self.drives.items() if drive.brake or drive.efficiency < 1.0}
+        """Joints that may stick, by friction, loads, brakes or losses of gears; where one coordinate is free its own
+        joint stands for all, for they rest with it."""
+        drives = self.drives.items()
+        if not self.several:
+            braked = any(np.isfinite(drive.brake_from) or drive.efficiency < 1.0 for _, drive in drives)
+            return self.names if self.sticking or braked else ()
+        resisting = {name for name, drive in drives if drive.brake or drive.efficiency < 1.0}
         resisting |= self.system.resisted.keys()
         resisting |= set(self.sticking) & set(felt(self.system, self.system.mechanism.parameter_set.nominal))
         return tuple(name for name in self.system.joints if name in resisting)
 
-    @cached_property
-    def rests(self) -> bool:
-        """Whether the one free coordinate may rest in friction."""
-        may_rest = any(np.isfinite(drive.brake_from) or drive.efficiency < 1.0 for drive in self.drives.values())
-        return len(self.names) == 1 and bool(self.sticking or may_rest)
+    def rests(self, at: Moment) -> bool:
+        """Whether the one free coordinate rests in what resists it."""
+        return not self.several and bool(_sticking_rows(at))
+
+    def stays(self, at: Moment) -> bool:
+        """Whether everything rests: no driver moves other links meanwhile."""
+        return self.rests(at) and len(self.system.mechanism.drivers) == 1
 
     @cached_property
     def affine(self) -> bool:
@@ -261,37 +284,53 @@ class FreeMotion:
         """1/condition of every module of `meeting`, which is 0 where two of its assemblies meet."""
         return [1.0 / primal(self.system.groups[k].condition(walk.poses[k])) for k in self.meeting]
 
-    def solve(
-        self, at: Moment, second: Array, zero_slip: Mapping[str, Sense] | None = None, sliding: bool = False
-    ) -> Backward:
-        """Motion and forces. zero_slip, sliding: see `backward.Given`; of one coordinate what begins to move in its
-        sense."""
+    def solve(self, at: Moment, second: Array, senses: Mapping[str, Sense], sliding: bool = False) -> Backward:
+        """Motion and forces. senses, sliding: see `backward.Given`."""
         self.walked[0] += 1
         touches = any(onset is not None for onset in at.onsets)
         given_state = Given(
-            self.beginning(at) if zero_slip is None else zero_slip,
+            senses,
             dict(zip(self.bristles, at.bristles, strict=True)),
             acting=(lambda walk: self.contacts.actions(walk, at.onsets)) if touches else None,
-            sliding=sliding,
-            rests={joint: sense == 0 for joint, sense in zip(self.resisted, at.senses, strict=False)},
+            sliding=sliding and not self.rests(at),
+            rests=dict(zip(self.resisted, (sense == 0 for sense in at.senses), strict=False)) if self.several else {},
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given_state)
 
-    def beginning(self, at: Moment, share: Number = 1.0) -> dict[str, Sense]:
-        """The sense in which each joint that sticks is about to move, times a share; of several coordinates those in
-        which joints slide."""
-        if at.senses:
-            return {joint: float(sense) for joint, sense in zip(self.resisted, at.senses, strict=True)}
-        if len(self.names) != 1 or not self.sticking or not np.any(at.sense):
-            return {}
+    def pattern(self, at: Moment) -> dict[str, tuple[int, Sense]]:
+        """By joint the row of `resisted` with which it sticks or slides, and the sense in which it moves where that row
+        moves forward; none where the senses are not known."""
+        if self.several or not at.senses:
+            return {joint: (k, 1.0) for k, joint in enumerate(self.resisted if at.senses else ())}
+        if not self.sticking:
+            return {self.names[0]: (0, 1.0)}
         zero: Any = [0.0 * at.q[0]]
         rate: Any = [np.sqrt(self.trial[0]) + zero[0]]
         walk = self.walk(at._replace(rate=rate), zero)
-        senses: dict[str, Sense] = {}
+        signs: dict[str, tuple[int, Sense]] = {self.names[0]: (0, 1.0)}
         for joint in self.sticking:
             sign = np.where(walk.still(joint, self.system.turns(joint)), 0.0, np.sign(walk.speed(joint)))
-            senses[joint] = at.sense * share * sign
-        return senses
+            signs[joint] = (0, sign)
+        return signs
+
+    def senses(self, at: Moment, pattern: Pattern | None = None, shares: Sequence[Any] | None = None) -> Senses:
+        """By joint its sense, times the share of what resists it that acts. shares: of every row, else the senses."""
+        shares = at.senses if shares is None else shares
+        return {joint: shares[k] * sign for joint, (k, sign) in (pattern or self.pattern(at)).items()}
+
+    def excess(self, at: Moment) -> Array:
+        """By how much what drives the one free coordinate at rest exceeds the efforts at which it would break away
+        forward and backward, N m or N, (2, lane); −inf where friction has no solution: it locks that way."""
+        zero, excess = np.zeros_like(at.q), np.empty((2, at.q.shape[1]))
+        pattern = self.pattern(at._replace(senses=(1,)))
+        with np.errstate(all="ignore"):
+            for k, sense in enumerate((1, -1)):
+                begins = at._replace(senses=(sense,))
+                senses = self.senses(begins, pattern)
+                demanded = self.demanded(self.solve(begins, zero, senses), at.q.shape)[0]
+                miss = sense * (self.given(begins, zero, senses)[0] - demanded)
+                excess[k] = np.where(np.isfinite(demanded), miss, -np.inf)
+        return excess
 
     # ---- the assembly by momentum -----------------------------------------------------------------------------
 
@@ -315,22 +354,17 @@ class FreeMotion:
     # ---- accelerations ----------------------------------------------------------------------------------------
 
     def driven(self, at: Moment, second: Any, senses: Mapping[str, Sense]) -> list[Number]:
-        """What the motors give, less the brakes, of each coordinate. senses: shares of what resists the joints that
-        stick, and senses of those that slide, where several coordinates are free."""
-        efforts = list[Number]()
-        for i, (name, motor_drive) in enumerate(self.drives.items()):
-            rate, drive = at.rate[i], motor_drive.seen(at.now, at.slips)
-            if at.senses and name in senses:
-                efforts.append(drive.resisted(at.time, rate, second[i], at.integral[i], at.now, senses[name]))
-                continue
-            effort = drive.effort(at.time, rate, second[i], at.integral[i], at.now, at.sense)
-            sense = np.where(rate != 0.0, np.sign(rate), at.sense)
-            efforts.append(effort - sense * drive.braking(at.now))
-        return efforts
+        """What the motors give, less the brakes, of each coordinate. senses: of `senses`."""
+        return [
+            drive.seen(at.now, at.slips).effort(
+                at.time, at.rate[i], second[i], at.integral[i], at.now, senses.get(name)
+            )
+            for i, (name, drive) in enumerate(self.drives.items())
+        ]
 
-    def given(self, at: Moment, second: Array, senses: Mapping[str, Sense] | None = None) -> Array:
+    def given(self, at: Moment, second: Array, senses: Mapping[str, Sense]) -> Array:
         """The same of many lanes, (coordinate, lane)."""
-        return np.array(self.driven(at, second, senses or {})).reshape(at.q.shape)
+        return np.array(self.driven(at, second, senses)).reshape(at.q.shape)
 
     def demanded(self, back: Backward, shape: tuple[int, ...]) -> Array:
         """Efforts that a walk demands of the free drivers, (coordinate, lane)."""
@@ -361,22 +395,29 @@ class FreeMotion:
 
     def searched(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
         """See `accelerate`, from one place."""
-        active, senses, (count, lanes) = self.held(at), self.beginning(at), at.q.shape
+        active, pattern, (count, lanes) = self.held(at), self.pattern(at), at.q.shape
         unit, typical = self._units(active)
         joints = slice(len(unit) - len(active.joints), None)
         numbers = np.zeros((len(unit), lanes))
-        numbers[:count] = self._begun(at, senses) if guess is None else guess
+        numbers[:count] = self._begun(at, pattern) if guess is None else guess
         pulls = np.zeros((len(active.joints), 1)) if pulls is None else pulls / typical
         last = before = numbers
         exact = self.affine and not active.joints
         for _ in range(ROUNDS):
-            missed, slopes = self._linearised(at, numbers, active, senses)
+            missed, slopes = self._linearised(at, numbers, active, pattern)
             slopes = slopes * unit
             missed[joints], slopes[joints] = missed[joints] / typical - pulls, slopes[joints] / typical[:, None]
             step, turned = newton_step(slopes, missed, numbers[joints])
             before, last, numbers = last, numbers, numbers + step * unit
+            missed, back, onsets = self._missed(at, numbers, active, pattern)
+            if self.rests(at):  # beyond a share of 1 friction may have no solution: nearer
+                for _ in range(HALVINGS):
+                    if not np.any(gone := np.any(np.isnan(missed), axis=0) & np.all(np.isfinite(step), axis=0)):
+                        break
+                    step = np.where(gone, 0.5 * step, step)
+                    numbers = last + step * unit
+                    missed, back, onsets = self._missed(at, numbers, active, pattern)
             largest = np.maximum(np.max(np.abs(numbers / unit), axis=0), 1e-6)
-            missed, back, onsets = self._missed(at, numbers, active, senses)
             missed[joints] = missed[joints] / typical - pulls
             rest = newton_step(slopes, missed, numbers[joints])[0]  # most are there after one step, as this walk tells
             if np.all(~np.isfinite(rest) | (np.abs(rest) <= SETTLED * largest)) and not np.any(turned):
@@ -392,7 +433,7 @@ class FreeMotion:
         if active.closed:
             onsets = self.shared(self.forced(at.onsets, numbers[count : joints.start], active), active.walls)
         if active.walls:
-            back = self.solve(at._replace(onsets=onsets), numbers[:count], senses, sliding=True)
+            back = self.solve(at._replace(onsets=onsets), numbers[:count], self.senses(at, pattern), sliding=True)
         shares = None
         if active.joints:
             shares = np.repeat(np.array(at.senses, float)[:, None], lanes, axis=1)
@@ -403,7 +444,7 @@ class FreeMotion:
         """The rows that hold."""
         closed = [k for k, onset in enumerate(at.onsets) if isinstance(onset, Closed)]
         walls = {self.contacts.each[k].surface: k for k in reversed(closed) if _sticks(at.onsets[k])}
-        return Held([k for k, sense in enumerate(at.senses) if sense == 0], closed, list(walls.values()))
+        return Held(_sticking_rows(at), closed, list(walls.values()))
 
     def _units(self, active: Held) -> tuple[Array, Array]:
         """What is typical of the unknowns, and of the accelerations of the joints that stick, (row, 1)."""
@@ -411,21 +452,23 @@ class FreeMotion:
         unit = np.concatenate([self.unit, forces, np.ones(len(active.joints))])
         return unit[:, None], self.typical[list(active.joints)][:, None]
 
-    def _begun(self, at: Moment, senses: Mapping[str, Sense]) -> Array:
+    def _begun(self, at: Moment, pattern: Pattern) -> Array:
         """Where the search for the accelerations begins: at 0, on the side of it to which they are driven."""
         second = np.zeros_like(at.q)
-        return second if self.affine else np.copysign(0.0, -self._missed(at, second, NONE, senses)[0])
+        return second if self.affine else np.copysign(0.0, -self._missed(at, second, NONE, pattern)[0])
 
     def _missed(
-        self, at: Moment, numbers: Array, active: Held, senses: Mapping[str, Sense]
+        self, at: Moment, numbers: Array, active: Held, pattern: Pattern
     ) -> tuple[Array, Backward, tuple[Onset, ...]]:
         """E − T, and the accelerations of gaps, slips and joints that are to be 0, (equation, lane); the walk, and the
         contacts with their forces."""
         count, lanes = at.q.shape
         second, forces, shares = np.split(numbers, [count, len(numbers) - len(active.joints)])
         onsets = self.forced(at.onsets, forces, active) if active.closed else at.onsets
-        if active.joints:
-            senses = {**senses, **{self.resisted[k]: share for k, share in zip(active.joints, shares, strict=True)}}
+        of_rows: list[Any] = list(at.senses)
+        for k, share in zip(active.joints, shares, strict=True):
+            of_rows[k] = share
+        senses = self.senses(at, pattern, of_rows)
         back = self.solve(at._replace(onsets=onsets), second, senses, sliding=True)
         moved = {k: self.contacts.each[k].accelerations(back.walk) for k in active.closed}
         rows = [
@@ -437,7 +480,7 @@ class FreeMotion:
             rows.append(self.pulls(back.walk, lanes)[list(active.joints)])
         return np.vstack(rows), back, onsets
 
-    def _linearised(self, at: Moment, numbers: Array, active: Held, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
+    def _linearised(self, at: Moment, numbers: Array, active: Held, pattern: Pattern) -> tuple[Array, Array]:
         """What is missed (equation, lane), and its derivatives by the unknowns (equation, unknown, lane)."""
         (size, lanes), count = numbers.shape, len(at.q)
         if self.affine:
@@ -448,9 +491,9 @@ class FreeMotion:
             least[count:] *= 1e2
             steps = np.copysign(DIFFERENCE * np.maximum(np.abs(numbers), least), numbers)
         tried = [numbers, *(numbers + np.where(np.arange(size)[:, None] == i, steps, 0.0) for i in range(size))]
-        wide: dict[str, Sense] = {
-            joint: np.tile(sense, size + 1) if isinstance(sense, np.ndarray) else sense
-            for joint, sense in senses.items()
+        wide: Pattern = {
+            joint: (k, np.tile(sign, size + 1) if isinstance(sign, np.ndarray) else sign)
+            for joint, (k, sign) in pattern.items()
         }
         missed = self._missed(repeated(at, size + 1), np.concatenate(tried, axis=1), active, wide)[0]
         missed = missed.reshape(size, size + 1, lanes)
@@ -460,7 +503,7 @@ class FreeMotion:
 
     def inertia(self, at: Moment) -> Array:
         """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""
-        return self._linearised(at, np.zeros_like(at.q), NONE, self.beginning(at))[1]
+        return self._linearised(at, np.zeros_like(at.q), NONE, self.pattern(at))[1]
 
     def far(self, second: Array) -> Array:
         """Accelerations far beyond some, one coordinate at a time, (coordinate, lane): along each, then against it."""
@@ -475,9 +518,9 @@ class FreeMotion:
         """
         far = self.far(np.zeros_like(at.q))
         many = repeated(at, far.shape[1])
-        slopes = self._linearised(many, far, NONE, self.beginning(many))[1]
-        still = at._replace(rate=0.0 * at.rate, sense=0.0, senses=(0,) * len(at.senses))
-        frictionless: dict[str, Sense] = dict.fromkeys((*self.resisted, *self.sticking), 0.0)
+        slopes = self._linearised(many, far, NONE, self.pattern(many))[1]
+        still = at._replace(rate=0.0 * at.rate, senses=(0,) * len(at.senses))
+        frictionless: Pattern = dict.fromkeys((*self.resisted, *self.sticking), (0, 0.0)) if at.senses else {}
         mass = self._linearised(still, np.zeros_like(at.q), NONE, frictionless)[1]
         stacks = [np.moveaxis(matrix * self.unit[None, :, None], -1, 0) for matrix in (slopes, mass)]
         growth: Array = np.linalg.det(stacks[0]) / np.linalg.det(stacks[1])
@@ -573,6 +616,11 @@ def _differences(speeds: Array) -> tuple[Array, Array]:
     return speeds[:, 1:] - speeds[:, :1], speeds[:, 0]
 
 
+def _sticking_rows(at: Moment) -> list[int]:
+    """Rows that stick; a sense that is recorded is that of one that slides."""
+    return [k for k, sense in enumerate(at.senses) if isinstance(sense, int) and sense == 0]
+
+
 def _sticks(onset: Onset) -> bool:
     """Whether a closed contact does."""
     return isinstance(onset, Closed) and onset.sense == 0
@@ -580,5 +628,5 @@ def _sticks(onset: Onset) -> bool:
 
 def repeated(at: Moment, times: int) -> Moment:
     """The same state in more lanes."""
-    q, rate, integral, bristles = (np.tile(part, (1, times)) for part in (at.q, at.rate, at.integral, at.bristles))
-    return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles)
+    q, rate, integral, bristles, slip = (np.tile(part, (1, times)) for part in at[1:6])
+    return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles, slip=slip)

@@ -152,7 +152,7 @@ def steady(
     if findings := list(_refused(mechanism)):
         raise MechanismError(findings)
     motion = FreeMotion.of(prepare(mechanism))
-    if motion.resisted:
+    if motion.several and motion.resisted:
         what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
         remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
         raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])

@@ -19,7 +19,6 @@ __all__ = [
     "MOTORS",
     "MotorKind",
     "constant",
-    "control_at_rest",
     "control_error",
     "induction",
     "linear",
@@ -39,8 +38,7 @@ class MotorKind:
 
     function: `(speed, time, parameters, integral) -> effort` at the motor's own shaft, N m or N; speed in rad/s or m/s;
     integral: of the controller's error over time, 0 of a motor without. error: of a kind with such an integral, its
-    rate `(speed, time, parameters, integral) -> rate`, and at_rest what it is after a time at speed 0. needs: keys that
-    must be given; takes: keys that may be.
+    rate `(speed, time, parameters, integral) -> rate`. needs: keys that must be given; takes: keys that may be.
     """
 
     function: Callable[[Array, Array, Parameters, Array], Array]
@@ -49,7 +47,6 @@ class MotorKind:
     source: str = ""
     validity: str = ""
     error: Callable[[Array, Array, Parameters, Array], Array] | None = None
-    at_rest: Callable[[Array, Parameters, Array], Array] | None = None
 
 
 def constant(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -107,23 +104,6 @@ def control_error(speed: Array, time: Array, parameters: Parameters, integral: A
     return rate
 
 
-def control_at_rest(since: Array, parameters: Parameters, integral: Array) -> Array:
-    """The controller's integral after a time at speed 0: it grows evenly up to where the limit begins to hold it, from
-    there by e^(−K_i |ω*| t/(BEYOND limit)) to where it is held."""
-    error, gain = float(parameters["target"]), float(parameters["integral"])
-    if gain == 0.0 or error == 0.0:
-        grown: Array = integral + error * since
-        return grown
-    limit, sense = parameters["limit"], np.sign(error)
-    begin, end = ((sense * share * limit - parameters["proportional"] * error) / gain for share in (1.0, 1.0 + BEYOND))
-    after = np.maximum(since - np.maximum((begin - integral) / error, 0.0), 0.0)  # from where it begins to be held
-    here = np.where((integral - begin) * sense > 0.0, integral, begin)
-    settled = end + (here - end) * np.exp(-gain * abs(error) / (BEYOND * limit) * after)
-    evenly = np.where(after > 0.0, settled, integral + error * since)
-    integral_at: Array = np.where((integral - end) * sense >= 0.0, integral, evenly)
-    return integral_at
-
-
 MOTORS: dict[str, MotorKind] = {
     "constant": MotorKind(constant, ("effort",), validity="a hanging weight, a cylinder at constant pressure"),
     "linear": MotorKind(
@@ -146,7 +126,6 @@ MOTORS: dict[str, MotorKind] = {
         source="K. J. Åström, R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press, 2021, chapter 11",
         validity="a servo drive whose current loop is fast against the mechanism",
         error=control_error,
-        at_rest=control_at_rest,
     ),
 }
 

@@ -39,7 +39,7 @@ def compiled(function: Callable[..., Sequence[Any]], *arrays: Array, width: int 
     numbers = [Recorded(graph, graph.input(f"x{k}", POSITION)) for k in range(len(arrays))]
     nodes = [number_of(graph, one) for one in function(*numbers)]
     count = len(arrays[0])
-    found = [np.empty((1, count), bool if graph.boolean(node) else float) for node in nodes]
+    found = [np.empty((1, count), bool if graph.booleans[node] else float) for node in nodes]
     code = machine_code.MachineCode(program(graph, nodes, width or machine_code.vector_width()))
     inputs = {f"x{k}": np.ascontiguousarray(array, float) for k, array in enumerate(arrays)}
     code.run(inputs, found, (0, 1), (0, count))
@@ -157,7 +157,7 @@ def test_numbers_given_by_sample_by_position_and_by_both(width: int) -> None:
     nodes = [number_of(graph, one) for one in outputs]
     code = machine_code.MachineCode(program(graph, nodes, width))
     inputs = {"g": np.array([0.3]), "s": rng.normal(size=5), "p": rng.uniform(size=11), "b": rng.normal(size=(5, 11))}
-    whole, parts = ([np.empty((5, 11), bool if graph.boolean(n) else float) for n in nodes] for _ in range(2))
+    whole, parts = ([np.empty((5, 11), bool if graph.booleans[n] else float) for n in nodes] for _ in range(2))
     code.run(inputs, whole, (0, 5), (0, 11))
     for samples in ((0, 2), (2, 5)):
         for positions in ((0, 4), (4, 11)):

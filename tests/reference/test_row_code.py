@@ -61,10 +61,12 @@ def _same(plain, coded, time, within=1e-12):
     for name in ("body_power", "gear_power"):
         np.testing.assert_allclose(getattr(coded, name), getattr(plain, name), rtol=1e-9, atol=1e-12)
     for link, motion in plain.walk.motions.items():
-        parts = [leaves_of(part) for part in (motion, coded.walk.motions[link])]
-        size = max(np.nanmax(np.abs(part), initial=1.0) for part in parts[0])
-        for part, other in zip(*parts, strict=True):
-            np.testing.assert_allclose(other, part, rtol=1e-9, atol=1e-12 * size)
+        parts = [np.array([np.broadcast_to(part, time.shape) for part in leaves_of(nest)])
+                 for nest in (motion, coded.walk.motions[link])]  # fmt: skip
+        lost = [np.isnan(part).any(axis=0) for part in parts]  # a pivot may be known of a link that is not
+        np.testing.assert_array_equal(*lost)
+        size = np.max(np.abs(parts[0][:, ~lost[0]]), initial=1.0)
+        np.testing.assert_allclose(parts[1][:, ~lost[0]], parts[0][:, ~lost[0]], rtol=1e-9, atol=1e-12 * size)
     for settled, other in zip(plain.settled, coded.settled, strict=True):
         for what in ("iterations", "converged", "certain", "share"):
             np.testing.assert_allclose(getattr(other, what), getattr(settled, what), rtol=1e-9, err_msg=what)
@@ -123,15 +125,3 @@ def test_a_table_that_does_not_reach_its_period_is_no_closed_one(monkeypatch):
 def test_no_times_are_no_positions():
     run = prepare(Mechanism(**entries_of(TEXTS["chain"])[0]))
     assert status_of(run.solve(np.zeros(0)), (0,)).shape == (0,)
-
-
-def test_numpy_solves_until_the_code_is_wanted(monkeypatch):
-    run = prepare(Mechanism(**entries_of(chain(14))[0]))
-    ran, run_code = [], parts.Parts.run
-    monkeypatch.setattr(parts.Parts, "run", lambda *given: ran.append(given) or run_code(*given))
-    run.compile(now=False)
-    run.solve(run.cycle.times(3))
-    assert not ran
-    run.compile()
-    run.solve(run.cycle.times(3))
-    assert ran

@@ -79,11 +79,10 @@ class _Resting:
     def changes(self) -> dict[float, Array]:
         """By how much each effort may be less, sign −1, and more, 1, (driver, lane); NaN where it may lock."""
         contacts, lanes = self.run.system.resting(self.joint), np.arange(len(self.time))
-        spots = np.zeros((contacts, len(SHARES), len(lanes)))
-        middle = self.efforts(spots[:, :1], lanes)[:, 0]
-        spots[0] = SHARES[:, None]
-        first = self.efforts(spots, lanes)
-        return {sign: self._change(sign, middle, first) for sign in (-1.0, 1.0)}
+        spots = np.zeros((contacts, 1 + len(SHARES), len(lanes)))
+        spots[0, 1:] = SHARES[:, None]
+        efforts = self.efforts(spots, lanes)
+        return {sign: self._change(sign, efforts[:, 0], efforts[:, 1:]) for sign in (-1.0, 1.0)}
 
     def _change(self, sign: float, middle: Array, first: Array) -> Array:
         """first: the efforts under shares of the first contact's resistance alone, from which its search sets out."""

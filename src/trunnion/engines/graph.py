@@ -20,7 +20,7 @@ EXP_RANGE = 700.0  # neither overflow nor loss of digits
 RANGES = {"sin": SINE_RANGE, "cos": SINE_RANGE, "exp": EXP_RANGE}
 SAMPLE, POSITION = 1, 2  # what a number differs by
 BOTH = SAMPLE | POSITION
-BOOLEAN = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "xor", "not", "finite"})
+BOOLEAN = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "xor", "not", "finite", "bool"})
 COMMUTATIVE = frozenset({"add", "mul", "max", "min", "and", "or", "xor", "eq", "ne"})
 OF_BOOLEANS = frozenset({"and", "or", "xor", "not"})
 
@@ -71,6 +71,8 @@ class Graph:
     def __init__(self, in_parts: bool = False) -> None:
         self.in_parts = in_parts
         self.nodes: list[Node] = []
+        self.values: list[float | bool | None] = []  # of each node that is a constant; None of others
+        self.booleans: list[bool] = []  # of each node, whether it is true or false rather than a number
         self.differs: list[int] = []  # of each node, by SAMPLE and POSITION
         self.within: list[int] = []  # of each node the loops whose state it depends on, a bit each
         self.loops: list[Loop] = []
@@ -95,6 +97,8 @@ class Graph:
             within |= self.within[arg]
         number = self._numbers[key] = len(self.nodes)
         self.nodes.append(key)
+        self.values.append(None)
+        self.booleans.append(op in BOOLEAN)
         self.differs.append(differs)
         self.within.append(within)
         return number
@@ -102,44 +106,37 @@ class Graph:
     def constant(self, value: Any) -> int:
         """A float or a bool that is known now. 0 and −0 are two."""
         if isinstance(value, (bool, np.bool_)):
-            return self.node("bool", (), bool(value))
-        value = float(value)
-        return self.node("float", (), (value, math.copysign(1.0, value)) if value == value else ("nan", 1.0))
-
-    def value(self, number: int) -> float | bool | None:
-        """What a constant is; None of any other node."""
-        node = self.nodes[number]
-        if node.op == "bool":
-            return bool(node.extra)
-        if node.op != "float":
-            return None
-        return math.nan if node.extra[0] == "nan" else float(node.extra[0])
+            value = bool(value)
+            number = self.node("bool", (), value)
+        else:
+            value = float(value)
+            sign = math.copysign(1.0, value)
+            number = self.node("float", (), (value, sign) if value == value else ("nan", 1.0))
+        self.values[number] = value
+        return number
 
     def input(self, name: str, differs: int) -> int:
         """A number that is given when the kernel is run."""
         self.inputs[name] = differs
         return self.node("input", (), name, differs)
 
-    def boolean(self, number: int) -> bool:
-        """Whether a node is true or false rather than a number."""
-        return self.nodes[number].op in BOOLEAN or self.nodes[number].op == "bool"
-
     def as_boolean(self, number: int) -> int:
-        return number if self.boolean(number) else self.apply("ne", number, self.constant(0.0))
+        return number if self.booleans[number] else self.apply("ne", number, self.constant(0.0))
 
     def as_float(self, number: int) -> int:
-        return self.where(number, self.constant(1.0), self.constant(0.0)) if self.boolean(number) else number
+        return self.where(number, self.constant(1.0), self.constant(0.0)) if self.booleans[number] else number
 
     # ---- operations -------------------------------------------------------------------------------------------
 
     def apply(self, op: str, *args: int) -> int:
         """An operation, simpler where what it is applied to allows."""
+        booleans = [self.booleans[arg] for arg in args]
         if op in OF_BOOLEANS:
             args = tuple(map(self.as_boolean, args))
-        elif not (op in ("eq", "ne") and all(map(self.boolean, args))):
+        elif True in booleans and not (op in ("eq", "ne") and False not in booleans):
             args = tuple(map(self.as_float, args))
-        constants = [self.value(arg) for arg in args]
-        if all(value is not None for value in constants):
+        constants = [self.values[arg] for arg in args]
+        if None not in constants:
             with np.errstate(all="ignore"):
                 return self.constant(FOLDED[op](*constants))
         simpler = self._of_one(op, args[0]) if len(args) == 1 else self._of_two(op, args, constants)
@@ -214,10 +211,10 @@ class Graph:
     def where(self, condition: int, a: int, b: int) -> int:
         """a where the condition holds, b elsewhere."""
         condition = self.as_boolean(condition)
-        constant = self.value(condition)
+        constant = self.values[condition]
         if constant is not None or a == b:
             return b if constant is False else a
-        if self.boolean(a) and self.boolean(b):
+        if self.booleans[a] and self.booleans[b]:
             other = self.apply("and", self.apply("not", condition), b)
             return self.apply("or", self.apply("and", condition, a), other)
         return self.node("where", (condition, self.as_float(a), self.as_float(b)))
@@ -254,7 +251,7 @@ class Graph:
                 break
             differs = most
         made = self.loops[index] = Loop(rounds, states, results, ends)
-        outer = [n for n in self._outside(made.outputs, index) if self.value(n) is None]
+        outer = [n for n in self._outside(made.outputs, index) if self.values[n] is None]
         loop = self.node("loop", (*start, *outer), index)
         return [self.node("result", (loop,), k) for k in range(len(start))]
 

@@ -89,7 +89,8 @@ class MachineCode:
         with COMPILING:
             self._engine = _linked(code)
         kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
-        self.function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
+        self.address = self._engine.get_function_address("kernel")
+        self.function = ctypes.CFUNCTYPE(None, *kinds)(self.address)
 
     def run(
         self,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from functools import cache
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from trunnion.engines.graph import BOTH, Graph, Loop
 from trunnion.engines.machine_code import MachineCode, vector_width
-from trunnion.engines.program import program
+from trunnion.engines.program import program, row_program
 
 __all__ = ["Parts"]
 
@@ -76,11 +77,10 @@ class Parts:
                 calls.append((code, len(given)))
                 lines.append(np.array([*given, *(self.rows[output] for output in part.outputs)], np.intp))
                 self.ends.append(len(self.rows))
-        starts = np.cumsum([0, *(len(line) for line in lines)]).tolist()
-        self._calls = [
-            (code.function, first, first + count) for (code, count), first in zip(calls, starts, strict=False)
-        ]
         self._codes = [code for code, _ in calls]  # as long as their functions are called
+        self._functions = np.array([code.address for code in self._codes], np.uintp)
+        starts = np.cumsum([0, *(len(line) for line in lines)])[: len(lines)]
+        self._starts = np.array([starts, starts + [count for _, count in calls]], np.uintp)  # of inputs and outputs
         self._places = np.concatenate(lines) if lines else np.zeros(0, np.intp)
 
     def run(self, given: Sequence[float | Array], positions: int, last: int | None = None) -> Array:
@@ -95,14 +95,18 @@ class Parts:
         for row, number in zip(table, given, strict=False):
             if not isinstance(number, (float, int)):
                 row[:positions] = number
-        base, stride = table.__array_interface__["data"][0], table.strides[0]
-        addresses = (self._places * stride + base).astype(np.uintp)
-        first = addresses.__array_interface__["data"][0]
-        for end, (function, inputs, outputs) in zip(self.ends, self._calls, strict=True):
-            function(0, 1, 0, lanes, lanes, None, None, None, first + 8 * inputs, first + 8 * outputs, None)
-            if last is not None and end > last:
-                break
+        calls = len(self.ends) if last is None else min(bisect_right(self.ends, last) + 1, len(self.ends))
+        addresses = (self._places * table.strides[0] + table.ctypes.data).astype(np.uintp)
+        inputs, outputs = self._starts * np.uintp(8) + np.uintp(addresses.ctypes.data)
+        pointers = (array.ctypes.data for array in (self._functions, inputs, outputs))
+        _row().function(0, calls, lanes, 0, 0, *pointers, None, None, None)
         return table
+
+
+@cache
+def _row() -> MachineCode:
+    """What runs many parts, one after the other."""
+    return MachineCode(row_program())
 
 
 def _parts(graph: Graph, outputs: Sequence[int]) -> Iterator[_Part]:
@@ -110,10 +114,11 @@ def _parts(graph: Graph, outputs: Sequence[int]) -> Iterator[_Part]:
     numbers = _with_loops(graph, outputs)
     of_part: dict[int, list[int]] = {}
     needed = set(outputs)
+    part_of = np.searchsorted(graph.cuts, np.arange(len(graph.nodes)), side="right").tolist()
     for number in numbers:
-        part = bisect_right(graph.cuts, number)
+        part = part_of[number]
         of_part.setdefault(part, []).append(number)
-        needed.update(arg for arg in graph.nodes[number].args if bisect_right(graph.cuts, arg) < part)
+        needed.update(arg for arg in graph.nodes[number].args if part_of[arg] < part)
     for part in sorted(of_part):
         call = next((number for number in of_part[part] if graph.nodes[number].op == "call"), None)
         if call is None:
@@ -146,13 +151,13 @@ def _copied(graph: Graph, numbers: Sequence[int], needed: set[int]) -> _Part:
 
     def copied(number: int) -> int:
         if number not in copies:
-            constant = graph.value(number)
+            constant = graph.values[number]
             if constant is not None:
                 copies[number] = copy.constant(constant)
             else:  # of an earlier part
                 inputs.append(number)
                 copies[number] = copy.input(str(len(inputs) - 1), BOTH)
-                if graph.boolean(number):
+                if graph.booleans[number]:
                     copies[number] = copy.as_boolean(copies[number])
         return copies[number]
 
@@ -164,7 +169,7 @@ def _copied(graph: Graph, numbers: Sequence[int], needed: set[int]) -> _Part:
 
     for number in numbers:
         op, args, extra = graph.nodes[number]
-        if op == "input" or graph.value(number) is not None:
+        if op == "input" or graph.values[number] is not None:
             continue
         if op == "state":
             index = loop_of(extra[0])

@@ -41,6 +41,46 @@ def program(graph: Graph, outputs: Sequence[int], width: int) -> Program:
     return _Writer(graph, outputs, width).write()
 
 
+def row_program() -> Program:
+    """A program that runs kernels on their own inputs by sample and position, one after the other.
+
+    kernel(first, last, P, …, kernels, inputs, outputs, …) runs those from the first to before the last on P positions.
+    """
+    module, nothing = ir.Module(name="trunnion"), ir.VoidType()
+    pointers = DOUBLE.as_pointer().as_pointer()
+    kernel = ir.FunctionType(nothing, [*[LONG] * 5, *[pointers] * 5, DOUBLE.as_pointer()]).as_pointer()
+    arrays = [kernel.as_pointer(), *[pointers.as_pointer()] * 2, *[pointers] * 3]
+    function = ir.Function(module, ir.FunctionType(nothing, [*[LONG] * 5, *arrays]), name="kernel")
+    first, last, positions, *_ = function.args
+    builder, zero = ir.IRBuilder(function.append_basic_block("entry")), ir.Constant(LONG, 0)
+
+    def run(k: Value) -> None:
+        entry, given, made = (builder.load(builder.gep(array, [k])) for array in function.args[5:8])
+        none = ir.Constant(pointers, None)
+        whole = (zero, ir.Constant(LONG, 1), zero, positions, positions)
+        builder.call(entry, [*whole, none, none, none, given, made, ir.Constant(DOUBLE.as_pointer(), None)])
+
+    _counted(builder, first, last, 1, run)
+    builder.ret_void()
+    return Program(str(module), ((), (), (), ()), 0, 1)
+
+
+def _counted(builder: Any, low: Value, high: Value, step: int, body: Callable[[Value], None]) -> None:
+    """for i in range(low, high, step): body(i)."""
+    before = builder.block
+    head, inside, after = (builder.append_basic_block() for _ in range(3))
+    builder.branch(head)
+    builder.position_at_end(head)
+    i = builder.phi(LONG)
+    i.add_incoming(low, before)
+    builder.cbranch(builder.icmp_signed("<", i, high), inside, after)
+    builder.position_at_end(inside)
+    body(i)
+    i.add_incoming(builder.add(i, ir.Constant(LONG, step)), builder.block)
+    builder.branch(head)
+    builder.position_at_end(after)
+
+
 @dataclass
 class _Writer:
     """One module as it is written."""
@@ -112,21 +152,6 @@ class _Writer:
 
     # ---- loops ----------------------------------------------------------------------------------------------------
 
-    def _counted(self, low: Value, high: Value, step: int, body: Callable[[Value], None]) -> None:
-        """for i in range(low, high, step): body(i)."""
-        before = self.b.block
-        head, inside, after = (self.b.append_basic_block() for _ in range(3))
-        self.b.branch(head)
-        self.b.position_at_end(head)
-        i = self.b.phi(LONG)
-        i.add_incoming(low, before)
-        self.b.cbranch(self.b.icmp_signed("<", i, high), inside, after)
-        self.b.position_at_end(inside)
-        body(i)
-        i.add_incoming(self.b.add(i, ir.Constant(LONG, step)), self.b.block)
-        self.b.branch(head)
-        self.b.position_at_end(after)
-
     def _positions(self, body: Callable[[Value], None]) -> None:
         """Vectors of positions, the last one moved back to end with the row."""
         low, high = self.arguments[2:4]
@@ -135,7 +160,7 @@ class _Writer:
         def moved(i: Value) -> None:
             body(self.b.select(self.b.icmp_signed(">", i, last), last, i))
 
-        self._counted(low, high, self.width, moved)
+        _counted(self.b, low, high, self.width, moved)
 
     def _fill_table(self, ahead: Sequence[int], wide: dict[int, Value]) -> None:
         low, high = self.arguments[2:4]
@@ -173,7 +198,7 @@ class _Writer:
                 values = {**wide, **self._loaded(POSITION, p), **self._loaded(BOTH, place)}
                 for k, n in enumerate(self.tabled):
                     entry = self._load(self.arguments[10], self._place(row, k, self.b.sub(p, low)))
-                    bit = self.graph.boolean(n)
+                    bit = self.graph.booleans[n]
                     values[n] = self.lanes.compare("!=", entry, self.lanes.constant(0.0)) if bit else entry
                 self._emit(each, values, self.lanes)
                 for k, n in enumerate(self.outputs):
@@ -181,7 +206,7 @@ class _Writer:
 
             self._positions(position)
 
-        self._counted(first, last, 1, sample)
+        _counted(self.b, first, last, 1, sample)
 
     # ---- memory ------------------------------------------------------------------------------------------------------
 
@@ -214,7 +239,7 @@ class _Writer:
     # ---- nodes -------------------------------------------------------------------------------------------------------
 
     def _of(self, n: int, values: dict[int, Value], lanes: Lanes) -> Value:
-        constant = self.graph.value(n)
+        constant = self.graph.values[n]
         return values[n] if constant is None else lanes.constant(constant)
 
     def _emit(self, numbers: Iterable[int], values: dict[int, Value], lanes: Lanes) -> None:
@@ -222,7 +247,7 @@ class _Writer:
         angles: dict[int, tuple[Value, Value]] = {}
         for n in numbers:
             op, args, extra = self.graph.nodes[n]
-            if n in values or self.graph.value(n) is not None:
+            if n in values or self.graph.values[n] is not None:
                 continue
             if op == "loop":
                 values[n] = self._loop(args, extra, values, lanes)

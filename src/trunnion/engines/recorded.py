@@ -67,7 +67,7 @@ class Recorded(Traced):
 
     @property
     def dtype(self) -> Any:
-        return np.dtype(bool if self.graph.boolean(self.node) else float)
+        return np.dtype(bool if self.graph.booleans[self.node] else float)
 
     def astype(self, kind: Any) -> Recorded:
         if np.dtype(kind) == bool:
@@ -100,7 +100,7 @@ class Recorded(Traced):
         if not graph.in_parts:
             return None
         nodes = [graph.as_float(number_of(graph, number)) for number in numbers]
-        constants = tuple(graph.value(node) for node in nodes)
+        constants = tuple(graph.values[node] for node in nodes)
         key = about(), constants
         if key not in _recurring:
             if len(_recurring) >= MOST_RECURRING:
@@ -113,10 +113,10 @@ class Recorded(Traced):
         graph.cut()
         varying = tuple(node for node, constant in zip(nodes, constants, strict=True) if constant is None)
         call = graph.node("call", varying, (inner, tuple(inner.as_float(result) for result in results)))
-        fixed = [inner.value(result) for result in results]
+        fixed = [inner.values[result] for result in results]
         rows = [Recorded(graph, graph.node("result", (call,), k)) if n is None else n for k, n in enumerate(fixed)]
         graph.cut()
-        return [row != 0.0 if inner.boolean(result) and n is None else row
+        return [row != 0.0 if inner.booleans[result] and n is None else row
                 for row, result, n in zip(rows, results, fixed, strict=True)]  # fmt: skip
 
     def all(self, axis: Any = None) -> Any:

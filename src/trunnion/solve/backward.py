@@ -200,22 +200,19 @@ def _by_code(
     return back
 
 
-def row_code(
-    system: System, values: Values, assembly: Assembly, turned: bool = False, held: bool | None = None
-) -> RowCode | None:
+def row_code(system: System, values: Values, assembly: Assembly, turned: bool = False) -> RowCode | None:
     """Machine code that solves a long row, see `row_code.code_of`; None of few modules."""
     if len(system.plan.modules) < MANY_MODULES:
         return None
     from trunnion.solve.row_code import code_of  # LLVM is loaded for long rows alone
 
-    return code_of(system, values, assembly, turned, _recorded, held)
+    return code_of(system, values, assembly, turned, _passed)
 
 
-def _recorded(system: System, values: Values, assembly: Assembly, time: Number, turned: bool) -> Backward:
-    """What machine code does, and NumPy at positions which that does not decide."""
-    with np.errstate(all="ignore"):
-        walk = forward(system, values, assembly, time)
-        return by_numpy(walk.backward() if turned else walk, FrictionMethod(), Given())
+@np.errstate(all="ignore")
+def _passed(walk: Forward, turned: bool) -> Backward:
+    """What machine code does after a walk, and NumPy at positions which that does not decide."""
+    return by_numpy(walk.backward() if turned else walk, FrictionMethod(), Given())
 
 
 def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backward:

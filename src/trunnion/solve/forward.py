@@ -101,6 +101,11 @@ class Forward:
         """Angular speed of every link, rad/s; real parts."""
         return {link: self.algebra.spin(motion.twist) for link, motion in self.motions.items()}
 
+    @cached_property
+    def frames(self) -> dict[str, Any]:
+        """Global frame of every link."""
+        return {link: motion.frame for link, motion in self.motions.items()}
+
     # ---- what it is worth ---------------------------------------------------------------------------------------
 
     @cached_property

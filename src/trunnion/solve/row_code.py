@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
-from functools import partial
+from functools import cache, cached_property, partial
 from operator import itemgetter
 from typing import Any
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number, UntraceableError
 from trunnion.engines.graph import BOTH, Graph
-from trunnion.engines.kernel import STRUCTURAL, TIME, literals
+from trunnion.engines.kernel import STRUCTURAL, TIME
 from trunnion.engines.parts import Parts
 from trunnion.engines.recorded import Recorded
 from trunnion.solve.forward import Assembly, Forward, SpatialWalk, forward
@@ -31,64 +31,85 @@ from trunnion.solve.system import System, Values
 __all__ = ["RowCode", "code_of", "leaves_of"]
 
 Array = NDArray[np.float64]
-Solve = Callable[[System, Values, Assembly, Number, bool], Any]  # gives a `Backward`
+Pass = Callable[[Forward, bool], Any]  # gives a `Backward`
+Codes = dict[bool, "RowCode | None"]  # by whether positions are passed the other way
 
 MOST_CODES = 8  # of a system: numbers that are 0 or 1 are compiled in, and to record each choice of them takes seconds
+LATEST = "latest"  # among the codes of a system: the numbers that were asked for last, and what of them is compiled in
 MOST_FORMS = 16  # of mechanisms whose code is kept at hand
 TRIED = np.array([0.0, 0.0137, 0.137, 1.37])  # s, at which code that was recorded of another mechanism is tried
 NUMBER = re.compile(r"[-+]?\.?\d[\d.]*([eE][-+]?\d+)?( [^-+*/^()]*)?$")  # with its unit, but no expression
+POINT = re.compile(r"links\.[^.]*\.(points\.[^.]*|centre)\.[xyz]$")
 BORDER = 99.0  # condition from which NumPy decides what a position is
 PLAIN = frozenset({float, int, bool, str, np.float64})  # types of numbers that have one value and no derivatives
 NUMBERS = (bool, int, float, np.generic, np.ndarray)
-OF_WALK = ("motions", "poses", "_elements")
+OF_WALK = ("motions", "frames", "poses", "_elements")
 EAGER = ("body_power", "gear_power")  # what has a default is not made when it is asked for
 STATED = ("walk", "travels", "margin_up_to", "margin")  # of a `Backward`, by whoever asks
 
 
-_recorded: dict[Hashable, RowCode] = {}
+_recorded: dict[Hashable, Codes] = {}
 
 
-def code_of(
-    system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve, held: bool | None = None
-) -> RowCode | None:
+def code_of(system: System, values: Values, assembly: Assembly, turned: bool, passed: Pass) -> RowCode | None:
     """The machine code for such numbers, recorded when it is first asked for; None where there is none.
 
     Parameters
     ----------
     turned
         Whether positions are passed the other way.
-    solve
-        What is to be compiled: it solves a system with numbers in an assembly at times, s, turned or not.
-    held
-        True: none is recorded until this is called with False.
+    passed
+        What is to be compiled: it goes back over a walk, turned or not.
     """
-    if system.inverse or not set(map(type, values.values())) <= PLAIN:
+    of_values, literal = system.codes.get(LATEST, (None, None))
+    if of_values is not values:  # of the same numbers more than one thing is asked
+        literal = _structure(values)
+        system.codes[LATEST] = values, literal
+    if system.inverse or literal is None:
         return None
-    literal = tuple((path, value) for path, value in values.items() if value in STRUCTURAL)
-    key = literal, tuple(placed if isinstance(placed, int) else id(placed) for placed in assembly), turned
-    if key not in system.codes and len(system.codes) >= MOST_CODES:
-        return None
-    if held:
-        system.codes.setdefault(key, None)
-    elif key not in system.codes or (held is False and system.codes[key] is None):
-        system.codes[key] = None
+    key = literal, tuple(place if isinstance(place, int) else id(place) for place in assembly)
+    if key not in system.codes:
+        if len(system.codes) > MOST_CODES:
+            return None
+        system.codes[key] = _alike((_form(system), *key), system, values, assembly, passed)
+    codes: Codes = system.codes[key]
+    if turned not in codes:
+        codes[turned] = None
         with suppress(UntraceableError):
-            system.codes[key] = _of_form((_form(system), *key), system, values, assembly, turned, solve)
-    code: RowCode | None = system.codes[key]
-    return code
+            codes[turned] = RowCode(system, values, assembly, turned, passed)
+    return codes[turned]
 
 
-def _of_form(form: Hashable, system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve) -> RowCode:
-    """The code of another mechanism that differs by numbers alone, if it solves this one too; else one that is new."""
-    code = _recorded.get(form)
-    if code is not None:
-        back, right = code.solved(system, values, TRIED), solve(system, values, assembly, TRIED, turned)
-        if back is not None and _same((back.reactions, back.walk.motions), (right.reactions, right.walk.motions)):
-            return code
+def _alike(form: Hashable, system: System, values: Values, assembly: Assembly, passed: Pass) -> Codes:
+    """The codes of another mechanism that differs by numbers alone, if they solve this one too; else none yet."""
+    codes = _recorded.get(form, {})
+    for turned, code in codes.items():
+        right = passed(forward(system, values, assembly, TRIED), turned)
+        back = None if code is None else code.solved(system, values, TRIED)
+        if back is None or _same((back.reactions, back.walk.motions), (right.reactions, right.walk.motions)):
+            return codes
+        break
     if len(_recorded) >= MOST_FORMS:
         _recorded.clear()
-    code = _recorded[form] = RowCode(system, values, assembly, turned, solve)
-    return code
+    codes = _recorded[form] = {}
+    return codes
+
+
+def _structure(values: Values) -> tuple[tuple[str, Any], ...] | None:
+    """What is compiled in: texts, and numbers by which kernels save work; None where a number has derivatives.
+
+    Not places of points, which a hand moves away from 0 and back.
+    """
+    if not set(map(type, values.values())) <= PLAIN:
+        return None
+    return tuple((path, value) for path, value in values.items()
+                 if (value in STRUCTURAL or isinstance(value, str)) and not _of_point(path))  # fmt: skip
+
+
+@cache
+def _of_point(path: str) -> bool:
+    """Whether a number is a coordinate of a point or mass centre."""
+    return POINT.match(path) is not None
 
 
 def _form(system: System) -> str:
@@ -113,9 +134,9 @@ class RowCode:
     Raises UntraceableError where the mechanism has what only NumPy does.
     """
 
-    def __init__(self, system: System, values: Values, assembly: Assembly, turned: bool, solve: Solve) -> None:
-        self.assembly, self.turned, self.solve = assembly, turned, solve
-        graph, literal = Graph(in_parts=True), literals(values)
+    def __init__(self, system: System, values: Values, assembly: Assembly, turned: bool, passed: Pass) -> None:
+        self.assembly, self.turned, self.passed = assembly, turned, passed
+        graph, literal = Graph(in_parts=True), dict(_structure(values) or ())
         numbers = {path: Recorded(graph, graph.input(path, BOTH)) for path in values if path not in literal}
         time, conditions = Recorded(graph, graph.input(TIME, BOTH)), list[Number]()
         with np.errstate(all="ignore"):
@@ -123,7 +144,7 @@ class RowCode:
             for group, pose in zip(system.groups, walk.poses, strict=True):
                 conditions.append(group.condition(pose))
                 graph.cut()
-            back = solve(system, {**literal, **numbers}, assembly, time, turned)
+            back = passed(walk, turned)
         self._kind: Any = type("Solved", (_Filled, type(back)), {})
         self._of_back = [entry.name for entry in fields(back) if entry.name not in STATED]
         nests = {name: getattr(back.walk, name) for name in OF_WALK}
@@ -138,7 +159,7 @@ class RowCode:
         )
         # what is in the nests is in one list: the rows of the table, then what is true or false, then what is the same
         # at all times and for all numbers
-        self._truths = [places[node] for node in dict.fromkeys(recorded) if graph.boolean(node)]
+        self._truths = [places[node] for node in dict.fromkeys(recorded) if graph.booleans[node]]
         truth_at = {row: len(places) + k for k, row in enumerate(self._truths)}
         self._same: list[Any] = []
 
@@ -149,15 +170,12 @@ class RowCode:
             self._same.append(leaf)
             return len(places) + len(self._truths) + len(self._same) - 1
 
-        placed = {name: _each(nest, place) for name, nest in nests.items()}
-        self._leaves = {name: leaves_of(nest) for name, nest in placed.items()}
-        self._makers = {name: _maker(nest) for name, nest in placed.items()}
+        self._nests = {name: _Nest(_each(nest, place)) for name, nest in nests.items()}
         in_table = range(len(places))
-        forces = [self._leaves[name] for name in ("reactions", "friction", "losses", "efforts")]
+        forces = [self._nests[name].leaves for name in ("reactions", "friction", "losses", "efforts")]
         self._forces = [row for rows in forces for row in rows if row in in_table]
-        frames = leaves_of([motion.frame for motion in back.walk.motions.values()])
-        self._frames = [places[leaf.node] for leaf in frames if isinstance(leaf, Recorded)]
-        moved = [row for row in self._leaves["motions"] if row in in_table]
+        self._frames = [row for row in self._nests["frames"].leaves if row in in_table]
+        moved = [row for row in self._nests["motions"].leaves if row in in_table]
         self._last = max([*moved, *self._conditions, *self._doubts], default=0)
 
     def solved(self, system: System, values: Values, time: Array) -> Any:
@@ -171,7 +189,7 @@ class RowCode:
         table[np.ix_(self._forces, ~assembled)] = np.nan
         if doubtful.all():
             return None
-        entries = _Entries(self._makers, table, self._truths, self._same)
+        entries = _Entries(self._nests, table, self._truths, self._same)
         bound = np.max(table[self._bound], axis=0, initial=0.0)
         walk = self._walked(system, values, time, entries)
         filled = self._kind.__new__(self._kind)
@@ -180,9 +198,9 @@ class RowCode:
         both[1][1].update(converged=~doubtful, share=np.where(doubtful, 0.0, 1.0), bound=bound)
         if doubtful.any():
             lanes = np.flatnonzero(doubtful)
-            back = self.solve(system, values, self.assembly, time[lanes], self.turned)
+            back = self.passed(forward(system, values, self.assembly, time[lanes]), self.turned)
             for name in (*OF_WALK, *self._of_back):
-                if not entries.put(self._leaves[name], getattr(back.walk if name in OF_WALK else back, name), lanes):
+                if not entries.put(name, getattr(back.walk if name in OF_WALK else back, name), lanes):
                     return None
             for (_, worth), of in zip(both, (back.walk, back), strict=True):
                 for name, number in worth.items():
@@ -196,7 +214,7 @@ class RowCode:
     def walked(self, system: System, values: Values, time: Array) -> Forward:
         """Motion alone at some times, s, NaN where it cannot be assembled."""
         table = self._table(values, time, self._last)
-        walk = self._walked(system, values, time, _Entries(self._makers, table, self._truths, self._same))
+        walk = self._walked(system, values, time, _Entries(self._nests, table, self._truths, self._same))
         walk.condition = np.max(table[self._conditions], axis=0, initial=1.0)
         walk.assembled = np.isfinite(np.sum(table[self._frames], axis=0))
         return walk
@@ -216,28 +234,31 @@ class RowCode:
 class _Entries:
     """What the attributes of a walk and of its forces are made of."""
 
-    def __init__(
-        self, makers: dict[str, Callable[[Any], Any]], table: Array, truths: list[int], same: list[Any]
-    ) -> None:
-        self.makers, self.table, self.truths = makers, table, truths
+    def __init__(self, nests: dict[str, _Nest], table: Array, truths: list[int], same: list[Any]) -> None:
+        self.nests, self.table, self.truths = nests, table, truths
         self.others = dict[int, Any]()  # in the place of what is the same elsewhere
         self._same = same
-        self._row: list[Any] = []
 
     def made(self, name: str) -> Any:
         """An attribute."""
-        if not self._row:
-            self._row = [*self.table, *(self.table[self.truths] != 0.0), *self._same]
-            for place, number in self.others.items():
-                self._row[place] = number
-        return self.makers[name](self._row)
+        nest, rows, first = self.nests[name], len(self.table), len(self.table) + len(self.truths)
+        row: dict[int, Any] = {}
+        for place in nest.places:
+            if place < rows:
+                row[place] = self.table[place]
+            elif place < first:
+                row[place] = self.table[self.truths[place - rows]] != 0.0
+            else:
+                row[place] = self.others[place] if place in self.others else self._same[place - first]
+        return nest.maker(row)
 
-    def put(self, leaves: list[int], nest: Any, lanes: NDArray[np.intp]) -> bool:
+    def put(self, name: str, nest: Any, lanes: NDArray[np.intp]) -> bool:
         """Put what NumPy found into some lanes; False where it is of another form.
 
         Also in the place of what is the same elsewhere, as the share that is reached where a module locks.
         """
-        numbers, rows, first = leaves_of(nest), len(self.table), len(self.table) + len(self.truths)
+        leaves, numbers = self.nests[name].leaves, leaves_of(nest)
+        rows, first = len(self.table), len(self.table) + len(self.truths)
         if len(numbers) != len(leaves):
             return False
         for place, number in zip(leaves, numbers, strict=True):
@@ -256,7 +277,7 @@ class _Filled:
 
     def __getattr__(self, name: str) -> Any:
         entries: _Entries | None = self.__dict__.get("_entries")
-        if entries is None or name not in entries.makers:
+        if entries is None or name not in entries.nests:
             raise AttributeError(name)
         self.__dict__[name] = value = entries.made(name)
         return value
@@ -271,6 +292,12 @@ class _Walked(_Filled, Forward):
         self.local = self.system.elements(self.values)
         return self.local
 
+    @cached_property
+    def frames(self) -> dict[str, Any]:
+        """Global frame of every link; the motions, of many more numbers, are not made for them."""
+        frames: dict[str, Any] = self._entries.made("frames")
+        return frames
+
 
 class _WalkedInSpace(_Walked, SpatialWalk):
     """Motion in space."""
@@ -279,23 +306,57 @@ class _WalkedInSpace(_Walked, SpatialWalk):
 # ---- nests of tuples, lists, dictionaries and dataclasses ------------------------------------------------------------
 
 
+class _Nest:
+    """A nest whose leaves are places in a row of entries."""
+
+    def __init__(self, placed: Any) -> None:
+        self.placed = placed
+
+    @cached_property
+    def leaves(self) -> list[int]:
+        """The places."""
+        return leaves_of(self.placed)
+
+    @cached_property
+    def places(self) -> list[int]:
+        """Each place once."""
+        return list(dict.fromkeys(self.leaves))
+
+    @cached_property
+    def maker(self) -> Callable[[Any], Any]:
+        """What makes such a nest of a row of entries."""
+        return _maker(self.placed)
+
+
+def _opened(nest: Any) -> tuple[Sequence[Any], Callable[[Any], Any]] | None:
+    """The parts of a nest and what makes such a nest of a list of them; None of a leaf."""
+    form = type(nest)
+    if form is tuple or form is list:
+        return nest, form
+    if form is dict:
+        return list(nest.values()), partial(_dictionary, list(nest))
+    if isinstance(nest, tuple):
+        return nest, form._make
+    if is_dataclass(form):
+        return [getattr(nest, entry.name) for entry in fields(form)], partial(_unpacked, form)
+    return None
+
+
 def _each(nest: Any, change: Callable[[Any], Any]) -> Any:
     """The same nest with `change` applied to what is in it."""
-    if isinstance(nest, dict):
-        return {key: _each(item, change) for key, item in nest.items()}
-    if isinstance(nest, (tuple, list)):
-        parts = [_each(item, change) for item in nest]
-        return type(nest)(*parts) if hasattr(nest, "_fields") else type(nest)(parts)
-    if is_dataclass(nest):
-        kind: Any = type(nest)
-        return kind(*(_each(getattr(nest, entry.name), change) for entry in fields(nest)))
-    return change(nest)
+    opened = _opened(nest)
+    return change(nest) if opened is None else opened[1]([_each(part, change) for part in opened[0]])
 
 
 def leaves_of(nest: Any) -> list[Any]:
     """All that is in a nest, in order."""
-    leaves: list[Any] = []
-    _each(nest, leaves.append)
+    leaves, left = list[Any](), [nest]
+    while left:
+        opened = _opened(last := left.pop())
+        if opened is None:
+            leaves.append(last)
+        else:
+            left += reversed(opened[0])
     return leaves
 
 
@@ -311,15 +372,10 @@ def _same(nest: Any, other: Any) -> bool:
 
 def _maker(nest: Any) -> Callable[[Any], Any]:
     """What makes such a nest from a row of entries, of places in it."""
-    form: Any = type(nest)
-    if isinstance(nest, dict):
-        parts, form = list(nest.values()), partial(_dictionary, list(nest))
-    elif isinstance(nest, (tuple, list)):
-        parts, form = list(nest), getattr(nest, "_make", form)
-    elif is_dataclass(nest):
-        parts, form = [getattr(nest, entry.name) for entry in fields(nest)], partial(_unpacked, form)
-    else:
+    opened = _opened(nest)
+    if opened is None:
         return itemgetter(nest)
+    parts, form = opened
     if len(parts) > 1 and all(isinstance(part, int) for part in parts):
         entries = itemgetter(*parts)  # by far the most often
         return entries if form is tuple else lambda row: form(entries(row))

@@ -75,11 +75,6 @@ class Run:
             return code.walked(self.system, values, time)
         return posed(self.system, values, self.chosen.assembly, time)
 
-    def compile(self, now: bool = True) -> None:
-        """Have a long row solved by machine code; if not `now`, by NumPy until this is called again."""
-        for turned in (False, True):
-            row_code(self.system, self.values, self.chosen.assembly, turned, not now)
-
     def at(
         self,
         time: Number,

@@ -37,14 +37,17 @@ def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
 def status_number(back: Backward) -> Number:
     """The gravest status in whatever shape the numbers of the walk have."""
     status = pose_status_number(back.walk)
-    reasons = [(Status.ZERO_SLIP, back.resting[name]) for name in sticking(back.walk.system)]
-    reasons += [(Status.NOT_CONVERGED, np.logical_not(back.converged)), (Status.LOCKED, np.less(back.share, 1.0))]
     reactions = (number for reaction in back.reactions.values() for number in flat(tuple(reaction)[:2]))
     forces = (*back.efforts.values(), *back.friction.values(), *reactions)
-    reasons.append((Status.NOT_CONVERGED, ~np.isfinite(_sum(forces))))
-    reasons += [(Status.LOAD_UNDEFINED, undefined) for undefined in back.undefined.values()]
-    for code, where in reasons:
-        status = np.maximum(status, np.where(where, np.int8(code), np.int8(0)))
+    reasons = {
+        Status.ZERO_SLIP: [back.resting[name] for name in sticking(back.walk.system)],
+        Status.NOT_CONVERGED: [np.logical_not(back.converged), ~np.isfinite(_sum(forces))],
+        Status.LOCKED: [np.less(back.share, 1.0)],
+        Status.LOAD_UNDEFINED: back.undefined.values(),
+    }
+    for code, where in reasons.items():
+        reached = functools.reduce(np.logical_or, where, np.False_)
+        status = np.maximum(status, np.where(reached, np.int8(code), np.int8(0)))
     return status
 
 

@@ -73,7 +73,7 @@ MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
 
 def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -> bytes:
     """The answer to a question; one that cannot be answered says why in a sentence. turn: of what is answered in turn;
-    what takes long is answered beside, for nobody is to wait for it."""
+    what takes long is answered beside, for nobody is to wait for it, and what a hand waits for."""
     head: dict[str, Any] = {}
     try:
         question = json.loads(request)
@@ -460,4 +460,4 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "drag": _drag, "try": _try, "edit": _edit, "export": _export, "assemblies": _assemblies, "layers": _layers,
     "blocks": _blocks, "margins": _margins, "curves": _curves, "compare": _compare, "corner": _corner,
 }  # fmt: skip
-BESIDE = (_outline, _cycle, _margins, _corner)
+BESIDE = (_outline, _drag, _try, _cycle, _margins, _corner)

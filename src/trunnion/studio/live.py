@@ -7,25 +7,24 @@ joints the forces are those of the position that is shown: those of a whole cycl
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import status_of
-from trunnion.solve.system import Values
+from trunnion.solve.system import Values, rubbing
 from trunnion.studio.loaded import Asked
-from trunnion.studio.placed import tracked
+from trunnion.studio.placed import columns, tracked, tracks
 from trunnion.studio.sketch import Vector
 
 __all__ = ["Live", "live_columns", "live_in_space", "places_at", "uncollected"]
@@ -78,6 +77,7 @@ class Live:
     run: Run
     values: Mapping[str, float]
     steps: int
+    _backs: dict[int, Backward] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _refuse_space(self.run)
@@ -97,17 +97,17 @@ class Live:
         """Whether all positions are solved in the time of a picture; else the shown one alone is."""
         return len(self.run.system.joints) * self.steps <= AT_ONCE
 
-    @lru_cache(maxsize=2)  # noqa: B019  # it lives as long as an answer is made
-    def _solved(self, index: int) -> Backward:
+    def solved(self, index: int) -> Backward:
         """Motion and forces of all positions, of many joints those of one position."""
-        if self.few and index:
-            return self._solved(0)
-        return self.run.solve(self.time if self.few else self.time[[index]], self.numbers)
+        key = 0 if self.few else index
+        if key not in self._backs:
+            self._backs[key] = self.run.solve(self.time if self.few else self.time[[index]], self.numbers)
+        return self._backs[key]
 
     @np.errstate(all="ignore")
     def nearest(self, link: str, point: str, to: Vector, index: int, slack: float) -> int:
         """Position at which a point of a link is nearest to a place, m: `index` unless another is nearer by `slack`."""
-        far = _far(self._solved(index).walk, link, point, to)
+        far = _far(self.solved(index).walk, link, point, to)
         if len(far) < self.steps:
             if far[0] <= slack:
                 return index
@@ -128,7 +128,7 @@ class Live:
             what moves. margin: the locking margin at the shown one, `value` None where it has none, and whether it is
             `beyond` that.
         """
-        back, lanes = self._solved(index), np.arange(self.steps) == index
+        back, lanes = self.solved(index), np.arange(self.steps) == index
         columns = live_columns(back, self.steps if self.few else 1)
         status = columns["status"]
         if not self.few:
@@ -143,7 +143,7 @@ class Live:
         joints = {(links[1], name) for name, (_, links) in system.joints.items() if name not in still}
         free = {(link, name) for link, name in system.points if link != ground and name not in system.joints}
         time = self.time[:: -(-len(joints | free) * self.steps // MOST_TRACKED)]
-        return _places(self.run.posed(time, self.numbers), len(time), joints | free)
+        return tracks(self.run.posed(time, self.numbers), len(time), joints | free)
 
 
 def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int) -> dict[str, Any]:
@@ -170,7 +170,7 @@ def _margin(run: Run, numbers: Values, back: Backward, status: int, time: float,
     """
     if status > Status.LOCKED:
         return {"value": None, "beyond": False}
-    many = sum(map(len, back.rubbed)) > MOST_FOLLOWED
+    many = sum(map(run.system.resting, rubbing(run.system))) > MOST_FOLLOWED
     if status == Status.ZERO_SLIP and run.cycle.duration > 0:
         figure = partial(margin_for_sure if many else margin_in, most=NEAR)
         beside = least_beside(figure, lambda at: run.solve(at, numbers), np.array([time]), run.cycle)
@@ -208,47 +208,23 @@ def live_columns(back: Backward, steps: int) -> dict[str, Any]:
         numbers[name, "friction_power"] = back.losses[name]
         if not system.turns(name):
             numbers[name, "friction"] = back.friction[name]
-    rows = _rows(list(numbers.values()), steps)
+    rows = columns(list(numbers.values()), steps)
     rows[:, status >= Status.NOT_CONVERGED] = np.nan
     joints: dict[str, dict[str, Array]] = {name: {} for name in ("", *system.joints)}
     for (name, part), row in zip(numbers, rows, strict=True):
         joints[name][part] = row
     efforts = joints.pop("")
-    frames = [motion.frame for motion in walk.motions.values()]
-    angles = np.arctan2(*(_rows([getattr(frame, part) for frame in frames], steps) for part in "sc"))
+    angles = np.arctan2(*(columns([getattr(frame, part) for frame in walk.frames.values()], steps) for part in "sc"))
     return {
-        "points": _places(walk, steps, walk.system.points),
-        "angles": dict(zip(walk.motions, angles, strict=True)),
+        "points": tracks(walk, steps),
+        "angles": dict(zip(walk.frames, angles, strict=True)),
         "status": [int(code) for code in status],
         "efforts": efforts,
         "joints": joints,
     }
 
 
-def _rows(numbers: Sequence[Any], steps: int) -> Array:
-    """Numbers of a walk at every position, (number, position): a call for each takes longer than all of them."""
-    table = np.empty((len(numbers), steps))
-    for row, number in zip(table, numbers, strict=True):
-        row[:] = primal(number)
-    return table
-
-
-def _places(walk: Forward, steps: int, points: Iterable[tuple[str, str]]) -> dict[str, dict[str, Array]]:
-    """Where points (link, name) are, x and y, m, by "link.name"."""
-    points = list(points)
-    order = {link: k for k, link in enumerate(dict.fromkeys(link for link, _ in points))}
-    frames = [walk.motions[link].frame for link in order]
-    x, y, c, s = (_rows([getattr(frame, part) for frame in frames], steps) for part in "xycs")
-    of = [order[link] for link, _ in points]
-    u, v = np.array([walk.local_place(link, name) for link, name in points], float).reshape(-1, 2).T[:, :, None]
-    places = np.stack([x[of] + c[of] * u - s[of] * v, y[of] + s[of] * u + c[of] * v], axis=1)
-    return {
-        f"{link}.{name}": dict(zip("xy", place, strict=True))
-        for (link, name), place in zip(points, places, strict=True)
-    }
-
-
 def _far(walk: Forward, link: str, point: str, to: Vector) -> Array:
     """Distance of a point of a link from a place at each position, m."""
-    track = _places(walk, len(walk.time), [(link, point)])[f"{link}.{point}"]
+    track = tracks(walk, len(walk.time), [(link, point)])[f"{link}.{point}"]
     return np.hypot(track["x"] - to[0], track["y"] - to[1])

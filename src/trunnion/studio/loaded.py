@@ -56,17 +56,12 @@ class Loaded:
         """The mechanism prepared; MechanismError if its structure does not determine its motion."""
         if self.mechanism is None:
             raise MechanismError(self.findings)
-        return self._without_code(prepare(self.mechanism))
+        return prepare(self.mechanism)
 
     @cached_property
     def frictionless_run(self) -> Run:
         """The same without friction."""
-        return self._without_code(prepare(self.run.system.mechanism.with_friction("off")))
-
-    def _without_code(self, run: Run) -> Run:
-        """A run whose machine code does not delay the first picture: it is recorded with the figures of the cycle."""
-        run.compile(now=False)
-        return run
+        return prepare(self.run.system.mechanism.with_friction("off"))
 
     @lru_cache(maxsize=2)  # noqa: B019  # a handful of texts is kept, see `loaded`
     def positions(self, steps: int, friction: bool) -> Positions:
@@ -99,14 +94,21 @@ class Loaded:
         from trunnion.cycle.summary import result_of
 
         positions, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
-        run.compile()
         with np.errstate(all="ignore"):
             return result_of(run, over_cycle(run, positions)).dataset
 
 
-@lru_cache(maxsize=8)
+_reading = Lock()  # a question that is asked meanwhile finds what was read for the one before
+
+
 def loaded(text: str) -> Loaded:
     """A model of a text, whatever the text is."""
+    with _reading:
+        return _loaded(text)
+
+
+@lru_cache(maxsize=8)
+def _loaded(text: str) -> Loaded:
     try:
         if len(text) > MOST_SIGNS:
             what = f"has {len(text):,} signs; the studio reads {MOST_SIGNS:,} at most"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import lru_cache, partial
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from math import cos, radians, sin
 from typing import Any
 
@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.nested import flat
 from trunnion.errors import MechanismError
 from trunnion.solve.forward import Forward
 from trunnion.studio.loaded import Loaded, loaded
 
-__all__ = ["column", "plain", "thumbnail", "tracked", "tracks"]
+__all__ = ["column", "columns", "plain", "thumbnail", "tracked", "tracks"]
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ TURNED, TILTED = radians(35), radians(25)  # of the view of mechanisms in space,
 @np.errstate(all="ignore")
 def tracked(state: Loaded, steps: int) -> dict[str, dict[str, Array]]:
     """Tracks of a model's points; MechanismError where its structure does not determine them."""
-    return tracks(state.run.walk(state.run.cycle.times(steps)), steps)
+    return tracks(state.run.posed(state.run.cycle.times(steps), state.run.values), steps)
 
 
 def column(number: Any, steps: int) -> Array:
@@ -36,15 +37,30 @@ def column(number: Any, steps: int) -> Array:
     return np.broadcast_to(np.asarray(primal(number), float), (steps,))
 
 
-def tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
-    """Where the points of the links are over the cycle, m."""
-    sampled = partial(column, steps=steps)
-    return {
-        f"{link}.{name}": dict(
-            zip("xyz", map(sampled, walk.placed(walk.motions[link].frame, link, name)), strict=False)
-        )
-        for link, name in walk.system.points
-    }
+def columns(numbers: Sequence[Any], steps: int) -> Array:
+    """Numbers of a walk at every position, (number, position): a call for each takes longer than all of them."""
+    table = np.empty((len(numbers), steps))
+    for row, number in zip(table, numbers, strict=True):
+        row[:] = primal(number)
+    return table
+
+
+def tracks(walk: Forward, steps: int, points: Iterable[tuple[str, str]] | None = None) -> dict[str, dict[str, Array]]:
+    """Where points (link, name) are over the positions of a walk, m, by "link.name"; all if none are named."""
+    points = list(walk.system.points if points is None else points)
+    order = {link: k for k, link in enumerate(dict.fromkeys(link for link, _ in points))}
+    numbers = columns([number for link in order for number in flat(walk.frames[link])], steps)
+    frames = numbers.reshape(len(order), -1, steps).swapaxes(0, 1)
+    if walk.system.spatial:
+        axes, origin = frames[:9].reshape(3, 3, len(order), steps), frames[9:]
+    else:
+        x, y, c, s = frames
+        axes, origin = np.array([[c, s], [-s, c]]), np.array([x, y])
+    of = [order[link] for link, _ in points]
+    local = np.array([walk.local_place(link, name) for link, name in points], float).reshape(len(of), -1).T
+    places = origin[:, of] + sum(part[:, None] * axis[:, of] for part, axis in zip(local, axes, strict=True))
+    return {f"{link}.{name}": dict(zip(walk.system.axes, place, strict=True))
+            for (link, name), place in zip(points, places.swapaxes(0, 1), strict=True)}  # fmt: skip
 
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, float]:

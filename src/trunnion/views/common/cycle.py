@@ -144,7 +144,13 @@ def over_turn(label: str, unit: str, values: Array, periodic: bool = True) -> Ab
 
 def numbers(values: Array) -> list[float | None]:
     """Numbers with seven digits, None for what is not finite."""
-    return [float(f"{value:.7g}") if isfinite(value) else None for value in values.tolist()]
+    values = np.asarray(values, float)
+    with np.errstate(all="ignore"):
+        places = 6.0 - np.floor(np.log10(np.abs(values)))
+        scale = 10.0 ** np.abs(places)  # a power of ten that is exact, so that the nearest float of each decimal comes
+        rounded = np.where(places < 0, np.rint(values / scale) * scale, np.rint(values * scale) / scale)
+    rounded = np.where(np.isfinite(rounded), rounded, values)  # of 0, and of what is too small to be scaled
+    return [value if isfinite(value) else None for value in rounded.tolist()]
 
 
 def series(values: Array | None) -> list[float | None]:

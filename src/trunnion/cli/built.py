@@ -3,31 +3,12 @@
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from typer import Option
 
 from trunnion.cli.files import verb
-from trunnion.cli.options import (
-    CURVES,
-    IMAGES,
-    WRITTEN,
-    At,
-    Engine,
-    Files,
-    Force,
-    Jobs,
-    Measures,
-    Model,
-    OnePosition,
-    Samples,
-    Seed,
-    Steps,
-    Uncut,
-    Write,
-    named_file,
-    share,
-)
+from trunnion.cli.options import CURVES, IMAGES, ONE_POSITION, WRITTEN, Files, Model, named_file, share
 from trunnion.cli.result import Shown, check_files, check_model, exit_status
 from trunnion.cli.terminal import bar, line
 from trunnion.errors import Finding, MechanismError
@@ -46,13 +27,11 @@ __all__ = ["allocate", "assemble", "play", "tolerance"]
 Uniform = StrEnum("Uniform", ["pins", "all"])
 
 
-@verb(lacks="table friction seat columns")
-def assemble(
-    model: Model, files: Files, steps: Steps = 360,
-    uniform: Annotated[
-        Uniform, Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
-    ] = Uniform.pins,
-) -> None:  # fmt: skip
+@verb(
+    lacks="table friction seat columns",
+    uniform="Joints with one common clearance: pins, or all kinds of play.",
+)
+def assemble(model: Model, files: Files, steps: int = 360, uniform: Uniform = Uniform.pins) -> None:
     """Clearance needed to assemble a linkage with axis errors."""
     from trunnion.studies.assembly import assemble as run
 
@@ -66,15 +45,11 @@ def assemble(
 # ---- play ------------------------------------------------------------------------------------------------------------
 
 
-@verb(lacks="seat columns")
+@verb(lacks="seat columns", at=ONE_POSITION)
 def play(
-    model: Model,
-    files: Files,
-    measure: Measures = None,
-    steps: Steps = 360,
-    at: OnePosition = None,
-    uncut: Uncut = False,
-) -> None:
+    model: Model, files: Files, measure: list[str] | None = None, steps: int = 360, at: str | None = None,
+    uncut: bool = False,
+) -> None:  # fmt: skip
     """Effect of the play of each joint on measures.
 
     Worst case, share of each joint, standard deviation.
@@ -97,34 +72,24 @@ OF_TOLERANCE = f"The name says which table: x.csv has the measures, x.parameters
 SECTIONS = "measures joints tolerances"
 
 
-@verb(lacks="units columns", out=f"{WRITTEN} {OF_TOLERANCE}")
+@verb(
+    lacks="units columns",
+    out=f"{WRITTEN} {OF_TOLERANCE}",
+    method="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+    target=Option(
+        "--yield", parser=share, metavar="SHARE",
+        help="Required share within limits, 0.99 or 99%; then it alone decides the exit status.",
+    ),
+    cluster="Address of a Dask scheduler.",
+    checkpoint="Folder that keeps the samples done; the same command continues.",
+    sample="NAME=FILE.csv: measured deviations of a number, one column. Repeatable.",
+    kind="A single figure: histogram, contributions or envelope.",
+)  # fmt: skip
 def tolerance(
-    model: Model, files: Files, measure: Measures = None, at: At = None,
-    method: Annotated[
-        list[str] | None,
-        Option(
-            "--method",
-            help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
-        ),
-    ] = None,
-    target: Annotated[
-        float | None,
-        Option("--yield", parser=share, metavar="SHARE",
-               help="Required share within limits, 0.99 or 99%; then it alone decides the exit status."),
-    ] = None,
-    samples: Samples = 10_000, seed: Seed = 1, steps: Steps = 360, jobs: Jobs = None, engine: Engine = "auto",
-    cluster: Annotated[str | None, Option("--cluster", help="Address of a Dask scheduler.")] = None,
-    checkpoint: Annotated[
-        Path | None, Option("--checkpoint", help="Folder that keeps the samples done; the same command continues.")
-    ] = None,
-    sample: Annotated[
-        list[str] | None,
-        Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
-    ] = None,
-    kind: Annotated[
-        str | None,
-        Option("--kind", help="A single figure: histogram, contributions or envelope."),
-    ] = None,
+    model: Model, files: Files, measure: list[str] | None = None, at: str | None = None,
+    method: list[str] | None = None, target: float | None = None, samples: int = 10_000, seed: int = 1,
+    steps: int = 360, jobs: int | None = None, engine: str = "auto", cluster: str | None = None,
+    checkpoint: Path | None = None, sample: list[str] | None = None, kind: str | None = None,
 ) -> None:  # fmt: skip
     """Effect of tolerances and play: worst case, RSS, yield, shares."""
     from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
@@ -157,34 +122,26 @@ Criterion = StrEnum("Criterion", {"worst_case": "worst-case", "rss": "rss", "yie
 Choice = StrEnum("Choice", ["auto", "continuous", "discrete"])
 
 
-@verb(lacks="units columns", out=f"{WRITTEN} {OF_ALLOCATION}")
+@verb(
+    lacks="units columns",
+    out=f"{WRITTEN} {OF_ALLOCATION}",
+    criterion="What must meet the limits: worst-case, rss or yield. [default: worst-case]",
+    target=Option(
+        "--yield", parser=share, metavar="SHARE",
+        help="Required share within all limits, 0.99 or 99%; implies --criterion yield.",
+    ),
+    choice="continuous, discrete, or auto: according to the stated costs.",
+    exact="Exact worst case of the mechanism instead of the first-order one.",
+    sure="The lower end of the 95 % interval of fresh samples has to meet the yield.",
+    curve="Number of points of the cost-accuracy curve; 0: no curve.",
+    samples="Number of random mechanisms for the verification; 0: none.",
+    kind="Which figure: trade-off, or one of `tolerance`.",
+)  # fmt: skip
 def allocate(
-    model: Model, files: Files, measure: Measures = None,
-    criterion: Annotated[
-        Criterion | None,
-        Option("--criterion", help="What must meet the limits: worst-case, rss or yield. [default: worst-case]"),
-    ] = None,
-    target: Annotated[
-        float | None,
-        Option("--yield", parser=share, metavar="SHARE",
-               help="Required share within all limits, 0.99 or 99%; implies --criterion yield."),
-    ] = None,
-    choice: Annotated[
-        Choice, Option("--choice", help="continuous, discrete, or auto: according to the stated costs.")
-    ] = Choice.auto,
-    exact: Annotated[
-        bool, Option("--exact", help="Exact worst case of the mechanism instead of the first-order one.")
-    ] = False,
-    sure: Annotated[
-        bool, Option("--sure", help="The lower end of the 95 % interval of fresh samples has to meet the yield.")
-    ] = False,
-    curve: Annotated[int, Option("--curve", help="Number of points of the cost-accuracy curve; 0: no curve.")] = 0,
-    at: At = None, steps: Steps = 360,
-    samples: Annotated[
-        int, Option("--samples", help="Number of random mechanisms for the verification; 0: none.")
-    ] = 10_000,
-    seed: Seed = 1, jobs: Jobs = None, write: Write = None, force: Force = False,
-    kind: Annotated[str | None, Option("--kind", help="Which figure: trade-off, or one of `tolerance`.")] = None,
+    model: Model, files: Files, measure: list[str] | None = None, criterion: Criterion | None = None,
+    target: float | None = None, choice: Choice = Choice.auto, exact: bool = False, sure: bool = False,
+    curve: int = 0, at: str | None = None, steps: int = 360, samples: int = 10_000, seed: int = 1,
+    jobs: int | None = None, write: Path | None = None, force: bool = False, kind: str | None = None,
 ) -> None:  # fmt: skip
     """Find the tolerances of minimum cost that meet the limits.
 

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
 
-from typer import Argument, Option
+from typer import Option
 
 from trunnion.cli.files import verb
 from trunnion.cli.options import Model
@@ -15,19 +14,22 @@ from trunnion.errors import Finding, MechanismError, counted
 __all__ = ["export", "import_"]
 
 
-@verb()
+@verb(
+    file="Drawing or model of another program, by extension.",
+    out="The model file to write: .yaml.",
+    ground="The part that does not move.",
+    drive="The joint that is driven.",
+    speed="Speed of the driver: 60rpm, 0.1m/s.",
+    material="Material of parts without one: steel, aluminium, …",
+    density="Density instead: 7850kg/m^3.",
+    gap="Greatest difference of the radii of a pin and its hole.",
+    unit="Length unit of a file that states none, such as mm, in, m.",
+    force="Overwrite the model file if it exists.",
+)
 def import_(
-    file: Annotated[Path, Argument(help="Drawing or model of another program, by extension.")],
-    out: Annotated[Path, Option("--out", "-o", help="The model file to write: .yaml.")],
-    ground: Annotated[str, Option("--ground", help="The part that does not move.")] = "",
-    drive: Annotated[str, Option("--drive", help="The joint that is driven.")] = "",
-    speed: Annotated[str, Option("--speed", help="Speed of the driver: 60rpm, 0.1m/s.")] = "",
-    material: Annotated[str, Option("--material", help="Material of parts without one: steel, aluminium, …")] = "steel",
-    density: Annotated[str | None, Option("--density", help="Density instead: 7850kg/m^3.")] = None,
-    gap: Annotated[str, Option("--gap", help="Greatest difference of the radii of a pin and its hole.")] = "0.5mm",
-    unit: Annotated[str, Option("--unit", help="Length unit of a file that states none, such as mm, in, m.")] = "mm",
-    force: Annotated[bool, Option("--force", help="Overwrite the model file if it exists.")] = False,
-) -> None:
+    file: Path, out: Path, ground: str = "", drive: str = "", speed: str = "", material: str = "steel",
+    density: str | None = None, gap: str = "0.5mm", unit: str = "mm", force: bool = False,
+) -> None:  # fmt: skip
     """Make a model file of a drawing or a model of another program."""
     from trunnion.exchange import import_file, model_text
     from trunnion.model.file import entries_of, place
@@ -49,20 +51,18 @@ def import_(
     end([*draft.findings, *place(checked, str(out), lines, data)], out, every=True)
 
 
-@verb(lacks="table friction seat")
+@verb(
+    lacks="table friction seat",
+    out="The file to write; its extension is the format.",
+    at="Position of the mechanism: 60deg, 20mm, 0.1s.",
+    frames="Number of positions in a file that moves.",
+    original=Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
+    magnify="Factor of the links' displacements by errors and play: 100.",
+)
 def export(
-    model: Model,
-    out: Annotated[Path, Option("--out", "-o", help="The file to write; its extension is the format.")],
-    at: Annotated[str | None, Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
-    frames: Annotated[int, Option("--frames", help="Number of positions in a file that moves.")] = 120,
-    original: Annotated[
-        str | None,
-        Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
-    ] = None,
-    magnify: Annotated[
-        float, Option("--magnify", help="Factor of the links' displacements by errors and play: 100.")
-    ] = 1.0,
-) -> None:
+    model: Model, out: Path, at: str | None = None, frames: int = 120, original: str | None = None,
+    magnify: float = 1.0,
+) -> None:  # fmt: skip
     """Write a mechanism for another program, at a position."""
     from trunnion.exchange import export_model
 

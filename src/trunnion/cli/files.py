@@ -1,4 +1,4 @@
-"""What makes a function a verb: its groups of options spread out, its outputs said before it begins.
+"""What makes a function a verb: its options by the names of its parameters, its outputs said before it begins.
 
 No output is a file that the verb reads, and no two are one file; both follow from the types of its options, as what its
 help calls files, numbers and texts does.
@@ -15,8 +15,10 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
+from typer import Option
 from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
 
+from trunnion.cli.options import OPTIONS
 from trunnion.errors import MechanismError
 from trunnion.files import Target, writing
 
@@ -26,8 +28,8 @@ Hints = dict[str, Any]  # types by the names of parameters
 IN_PLACE = {"write": "file"}  # may name that input itself; the verb asks for --force then
 
 
-def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a function a verb: Typer sees the options of its groups (`Model`, `Files`, …) as if they were its own.
+def verb(lacks: str = "", **helps: str | ParameterInfo) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a function a verb: Typer sees its parameters and those of its groups (`Model`, `Files`, …) as options.
 
     Modules with verbs do not postpone their annotations: as texts all options would be compiled at every start.
 
@@ -36,7 +38,7 @@ def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Calla
     lacks
         Options of the groups that this verb has not.
     **helps
-        What options of the groups do, where it is not what they do elsewhere.
+        What a parameter does, or how Typer is to read it, where that is not as in `OPTIONS`.
     """
 
     def decorated(function: Callable[..., None]) -> Callable[..., None]:
@@ -66,20 +68,22 @@ def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Calla
 
 
 def _spread(
-    function: Callable[..., None], hints: Hints, groups: Hints, lacks: Collection[str], helps: Mapping[str, str]
+    function: Callable[..., None],
+    hints: Hints,
+    groups: Hints,
+    lacks: Collection[str],
+    helps: Mapping[str, str | ParameterInfo],
 ) -> list[inspect.Parameter]:
     """The arguments of a verb, those of groups first, and its options, those of groups last."""
     every: list[tuple[int, inspect.Parameter]] = []
 
     def add(name: str, hint: Any, usual: Any, shared: bool) -> None:
-        kind, info = get_args(hint)[0], copy(hint.__metadata__[0])
-        info.help = helps.get(name, info.help)
+        info = _read(name.strip("_"), helps)
         argument = isinstance(info, ArgumentInfo)
-        info.metavar = info.metavar or (name.upper() if argument else _word(kind))
+        info.metavar = info.metavar or (name.upper() if argument else _word(hint))
         default = inspect.Parameter.empty if usual is MISSING else usual
-        parameter = inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
-        )
+        annotation = Annotated[hint, info]
+        parameter = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         every.append(((1 - shared) if argument else (2 + shared), parameter))
 
     for name, parameter in inspect.signature(function).parameters.items():
@@ -91,6 +95,18 @@ def _spread(
             if part.name not in lacks:
                 add(part.name, types[part.name], part.default, True)
     return [parameter for _, parameter in sorted(every, key=lambda pair: pair[0])]
+
+
+def _read(name: str, helps: Mapping[str, str | ParameterInfo]) -> ParameterInfo:
+    """How Typer reads a parameter: as it is declared for all verbs, with the help of this one."""
+    special = helps.get(name)
+    declared = special if isinstance(special, ParameterInfo) else OPTIONS.get(name, "")
+    info: ParameterInfo = (
+        copy(declared) if isinstance(declared, ParameterInfo) else Option(f"--{name.replace('_', '-')}", help=declared)
+    )
+    if isinstance(special, str):
+        info.help = special
+    return info
 
 
 @functools.cache

@@ -1,20 +1,14 @@
 """`trunnion rig`, `data`, `compare` and `identify`: data of test rigs, and the model beside them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
-from typer import Argument, Option
+from typer import Argument
 
 from trunnion.cli.files import verb
-from trunnion.cli.options import DATA, DataFiles, Files, Force, MappingFile, Model, Seed, Write, setting
-from trunnion.cli.result import (
-    Shown,
-    check_files,
-    check_model,
-    exit_status,
-    show_tables,
-)
+from trunnion.cli.options import DATA, Files, Model, setting
+from trunnion.cli.result import Shown, check_files, check_model, exit_status, show_tables
 from trunnion.cli.terminal import bar, line, say, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.results.attributes import findings_of
@@ -33,16 +27,12 @@ FEWEST = 20  # conditions from which a progress bar is worth it
 MOST_COMPARED, MOST_IDENTIFIED = 40, 24  # rows of the tables that are printed
 
 
-@verb()
-def rig(
-    model: Model,
-    rig_file: Annotated[Path, Argument(help="Rig file: YAML, JSON or TOML.")],
-    out: Annotated[
-        Path | None, Option("--out", "-o", help="Folder for data files, mapping.yaml and truth.yaml.")
-    ] = None,
-    format_: Annotated[str, Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.")] = "",
-    seed: Seed = 1,
-) -> None:
+@verb(
+    rig_file=Argument(help="Rig file: YAML, JSON or TOML."),
+    out="Folder for data files, mapping.yaml and truth.yaml.",
+    format="csv, parquet or tdms; default: as stated in the rig file.",
+)
+def rig(model: Model, rig_file: Path, out: Path | None = None, format_: str = "", seed: int = 1) -> None:
     """Virtual test rig: write simulated data files.
 
     Without --out the rig file is only checked.
@@ -83,14 +73,12 @@ def rig(
 # ---- data ------------------------------------------------------------------------------------------------------------
 
 
-@verb(lacks="report units columns", out=DATA)
-def data(
-    mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.")],
-    shared: Files,
-    files: Annotated[
-        list[Path] | None, typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms .nc.")
-    ] = None,
-) -> None:
+@verb(
+    lacks="report units columns",
+    out=DATA,
+    files=Argument(help="Data files instead of those it names: .csv .parquet .tdms .nc."),
+)
+def data(mapping: Path, shared: Files, files: list[Path] | None = None) -> None:
     """Read measured files: conditions, channels, scatter, faults."""
     from trunnion.results.export import save
     from trunnion.rig.reading.measurement import dataset
@@ -112,14 +100,15 @@ def data(
 # ---- compare ---------------------------------------------------------------------------------------------------------
 
 
-@verb(lacks="units columns")
+@verb(
+    lacks="units columns",
+    channel="A channel by its name in the mapping. Repeatable.",
+    condition="The condition to draw.",
+    kind="Figure of --out: efficiency or overlay.",
+)
 def compare(
-    model: Model, mapping: MappingFile, files: Files, data: DataFiles = None,
-    channel: Annotated[
-        list[str] | None, Option("--channel", help="A channel by its name in the mapping. Repeatable.")
-    ] = None,
-    condition: Annotated[str | None, Option("--condition", help="The condition to draw.")] = None,
-    kind: Annotated[str | None, Option("--kind", help="Figure of --out: efficiency or overlay.")] = None,
+    model: Model, mapping: Path, files: Files, data: list[Path] | None = None, channel: list[str] | None = None,
+    condition: str | None = None, kind: str | None = None,
 ) -> None:  # fmt: skip
     """Compare a model with measured data: residual, bias, verdict.
 
@@ -147,33 +136,19 @@ def compare(
 # ---- identify --------------------------------------------------------------------------------------------------------
 
 
-@verb(lacks="units columns")
+@verb(
+    lacks="units columns",
+    parameter="A parameter, named as in --set; NAME=PATH,PATH,… for several with one common value. Repeatable.",
+    channel="A channel by its name in the mapping. Repeatable; default: all usable ones.",
+    start="NAME=VALUE: start value; default: the value in the model.",
+    hold_out="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable.",
+    guard="Positions left out on each side of a friction reversal.",
+    kind="Which figure: intervals or residuals.",
+)
 def identify(
-    model: Model, mapping: MappingFile, files: Files, data: DataFiles = None,
-    parameter: Annotated[
-        list[str] | None,
-        Option("--parameter",
-               help="A parameter, named as in --set; NAME=PATH,PATH,… for several with one common value. Repeatable."),
-    ] = None,
-    channel: Annotated[
-        list[str] | None,
-        Option("--channel",
-               help="A channel by its name in the mapping. Repeatable; default: all usable ones."),
-    ] = None,
-    start: Annotated[
-        list[str] | None, Option("--start", help="NAME=VALUE: start value; default: the value in the model.")
-    ] = None,
-    hold_out: Annotated[
-        list[str] | None,
-        Option("--hold-out",
-               help="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable."),
-    ] = None,
-    guard: Annotated[
-        int | None, Option("--guard", help="Positions left out on each side of a friction reversal.")
-    ] = None,
-    write: Write = None,
-    force: Force = False,
-    kind: Annotated[str | None, Option("--kind", help="Which figure: intervals or residuals.")] = None,
+    model: Model, mapping: Path, files: Files, data: list[Path] | None = None, parameter: list[str] | None = None,
+    channel: list[str] | None = None, start: list[str] | None = None, hold_out: list[str] | None = None,
+    guard: int | None = None, write: Path | None = None, force: bool = False, kind: str | None = None,
 ) -> None:  # fmt: skip
     """Identify parameters of a model from measured data.
 

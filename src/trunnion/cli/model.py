@@ -6,9 +6,8 @@ import os
 import socket
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from typer import Argument, Option
 
 from trunnion.cli.files import verb
@@ -30,18 +29,13 @@ __all__ = ["check", "examples", "schema", "studio"]
 HEAD = ["name", "value", "unit"]
 
 
-@verb(lacks="seat")
-def check(
-    model: Model,
-    assemblies: Annotated[
-        Path | None,
-        Option("--assemblies", help="Also draw the assembly modes of each group: a .png, .svg or .pdf file."),
-    ] = None,
-    list_: Annotated[
-        bool, Option("--list", help="List what can be set, swept and measured, with units and values.")
-    ] = False,
-    out: Annotated[Path | None, Option("--out", "-o", help="Write that list: a .json file.")] = None,
-) -> None:
+@verb(
+    lacks="seat",
+    assemblies="Also draw the assembly modes of each group: a .png, .svg or .pdf file.",
+    list="List what can be set, swept and measured, with units and values.",
+    out="Write that list: a .json file.",
+)
+def check(model: Model, assemblies: Path | None = None, list_: bool = False, out: Path | None = None) -> None:
     """Check a model: findings, mobility, structure, assembly modes."""
     if list_ or out:
         _list(model, out)
@@ -122,14 +116,12 @@ def _row(entry: "NamedNumber | NamedMeasure", text: str) -> list[str]:
 USUAL = 8765
 
 
-@verb()
-def studio(
-    file: Annotated[Path | None, typer.Argument(help="Model to open, or the folder of models.")] = None,
-    port: Annotated[
-        int | None, typer.Option("--port", help="Port on this machine; default: 8765, or any if that is taken.")
-    ] = None,
-    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the browser.")] = True,
-) -> None:
+@verb(
+    file="Model to open, or the folder of models.",
+    port="Port on this machine; default: 8765, or any if that is taken.",
+    open=Option("--open/--no-open", help="Open the browser."),
+)
+def studio(file: Path | None = None, port: int | None = None, open_: bool = True) -> None:
     """Draw a mechanism in the browser, drag it, watch its forces."""
     from trunnion.cli.forms import forms
 
@@ -175,12 +167,12 @@ def _bound(stated: int | None) -> socket.socket:
 FileKind = StrEnum("FileKind", ["model", "data"])  # files that have a JSON Schema
 
 
-@verb()
-def examples(
-    name: Annotated[str | None, Argument(help="Example to copy; without it, all are listed.")] = None,
-    to: Annotated[Path, Option("--to", help="Folder to copy it into.")] = Path(),
-    force: Annotated[bool, Option("--force", help="Overwrite a file of that name.")] = False,
-) -> None:
+@verb(
+    name=Argument(help="Example to copy; without it, all are listed."),
+    to="Folder to copy it into.",
+    force="Overwrite a file of that name.",
+)
+def examples(name: str | None = None, to: Path = Path(), force: bool = False) -> None:
     """List the example models, rigs and drawings, or copy one."""
     here = Path(__file__).resolve().parent.parent
     place = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"  # of the source tree
@@ -203,13 +195,8 @@ def examples(
     wrote(target)
 
 
-@verb()
-def schema(
-    of: Annotated[
-        FileKind, Option("--of", help="File: model, or data for the mapping of measured data.")
-    ] = FileKind.model,
-    out: Annotated[Path | None, Option("--out", "-o", help="Write it to a file.")] = None,
-) -> None:
+@verb(of="File: model, or data for the mapping of measured data.", out="Write it to a file.")
+def schema(of: FileKind = FileKind.model, out: Path | None = None) -> None:
     """Print the JSON Schema of model or mapping file, for editors."""
     if of is FileKind.data:
         from trunnion.rig.reading.mapping import schema_text

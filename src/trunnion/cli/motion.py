@@ -1,25 +1,12 @@
 """`trunnion analyse`, `simulate`, `locking`, `design`, `plot`, `report`: motion and forces, in numbers and pictures."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from typer import Exit, Option
+from typer import Exit
 
 from trunnion.cli.files import verb
-from trunnion.cli.options import (
-    DATA,
-    IMAGES,
-    PLOT_KINDS,
-    Engine,
-    Files,
-    Friction,
-    Model,
-    OnePosition,
-    Picture,
-    Steps,
-    Uncut,
-    seconds,
-)
+from trunnion.cli.options import DATA, IMAGES, ONE_POSITION, PLOT_KINDS, Files, Friction, Model, seconds
 from trunnion.cli.result import Shown, check_files, check_page, end, exit_status, write_text
 from trunnion.cli.terminal import bar, line, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity
@@ -39,19 +26,18 @@ __all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]
 # ---- analyse ---------------------------------------------------------------------------------------------------------
 
 
-@verb(out=DATA)
+@verb(out=DATA, at=ONE_POSITION)
 def analyse(
-    model: Model, files: Files, settled: Friction, steps: Steps = 360, at: OnePosition = None, uncut: Uncut = False,
-    engine: Engine = "auto",
+    model: Model, files: Files, settled: Friction, steps: int = 360, at: str | None = None, uncut: bool = False,
+    engine: str = "auto",
 ) -> None:  # fmt: skip
     """Analyse a cycle: motion, reactions, friction, effort, power."""
     check_files(files, drawn=False, instead=f"trunnion plot {model.file}")
     if files.report and at:
         raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
     mechanism = model.read()
-    saved = {"units_row": files.units_row, "columns": files.columns, "units": files.units}
     with model.lines():
-        result = _analysed(mechanism, steps, settled.checked(), engine=engine, out=files.out or [], saved=saved, at=at)
+        result = _analysed(mechanism, steps, settled.checked(), engine=engine, at=at)
 
     def show_position() -> None:
         """Every number of one position, with its unit."""
@@ -64,18 +50,16 @@ def analyse(
             rows.append([name, text, "" if output == "1" else output])
         show_rows(f"{result.attrs['name'] or model.file} at {at}", ["", "value", "unit"], rows)
 
-    output = Shown(result, model, Files(), "assembly", show=show_position if at else None, written=files.out or [])
+    output = Shown(result, model, files, "assembly", show=show_position if at else None)
     if files.report is not None:
-        write_text(_page(mechanism, result, uncut), files.report)
-        output.written.append(files.report)
-    output.end()
+        from trunnion.views.common.peaks import whole_peaks
+
+        output.pictured, output.paged = whole_peaks(result.dataset, uncut), {"ideal": _ideal(mechanism, steps)}
+    output.finish()
 
 
-@verb(lacks="seat")
-def design(
-    model: Model,
-    fluctuation: Annotated[float, Option("--fluctuation", help="Speed fluctuation that the flywheel allows.")] = 0.05,
-) -> None:
+@verb(lacks="seat", fluctuation="Speed fluctuation that the flywheel allows.")
+def design(model: Model, fluctuation: float = 0.05) -> None:
     """Design values: transmission angle, dead centres, flywheel.
 
     Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor.
@@ -88,17 +72,15 @@ def design(
     show_figures(mechanism.name or str(model.file), figures)
 
 
-@verb()
+@verb(
+    out="Folder, or a .png .svg .pdf .jpg file of one plot.",
+    kind=f"{PLOT_KINDS}. Repeatable; all if not given.",
+    at="Position to draw the mechanism in: 60deg, 20mm, 0.1s.",
+    format="png, svg, pdf or jpg, for a folder of figures.",
+)
 def plot(
-    model: Model,
-    out: Annotated[Path, Option("--out", "-o", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
-    kind: Annotated[list[str] | None, Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.")] = None,
-    steps: Steps = 360,
-    at: Annotated[
-        str | None,
-        Option("--at", help="Position to draw the mechanism in: 60deg, 20mm, 0.1s."),
-    ] = None,
-    image: Picture = "png", uncut: Uncut = False,
+    model: Model, out: Path, kind: list[str] | None = None, steps: int = 360, at: str | None = None,
+    format_: str = "png", uncut: bool = False,
 ) -> None:  # fmt: skip
     """Plot a cycle: torque, friction power, reactions, mechanism."""
     from trunnion.views.charts import check_kind
@@ -119,24 +101,23 @@ def plot(
         folder(out)
     drawn = whole_peaks(result, uncut)
     for name, picture in [(name, figure(drawn, name, ideal, at)) for name in kind or drawable(result)]:
-        path = out if single else out / f"{name}.{image.lstrip('.')}"
+        path = out if single else out / f"{name}.{format_.lstrip('.')}"
         save(picture, path)
         wrote(path)
     end([finding for finding in findings_of(result) if finding.severity is not Severity.NOTE], model.file, "assembly")
 
 
-@verb()
-def report(
-    model: Model,
-    out: Annotated[Path, Option("--out", "-o", help="The HTML file to write.")],
-    settled: Friction, steps: Steps = 360, uncut: Uncut = False,
-) -> None:  # fmt: skip
+@verb(out="The HTML file to write.")
+def report(model: Model, out: Path, settled: Friction, steps: int = 360, uncut: bool = False) -> None:
     """Write an HTML report: animation, plots, findings, inputs."""
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.shown import report_of
+
     check_page(out, "--out")
     mechanism = model.read()
     with model.lines():
         result = _analysed(mechanism, steps, settled.checked())
-    write_text(_page(mechanism, result, uncut), out)
+    write_text(report_of(whole_peaks(result.dataset, uncut), ideal=_ideal(mechanism, steps)), out)
     wrote(out)
     raise Exit(exit_status(findings_of(result)))
 
@@ -156,42 +137,25 @@ def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":
     return _analysed(mechanism.with_friction("off"), steps).dataset
 
 
-def _page(mechanism: "Mechanism", analysed: "Result", uncut: bool) -> str:
-    """The report of a cycle as HTML."""
-    from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.report import report as page
-
-    result = analysed.dataset
-    drawn = whole_peaks(result, uncut)
-    return page(drawn, _ideal(mechanism, result.sizes["position"]))
-
-
 # ---- simulate --------------------------------------------------------------------------------------------------------
 
 PERCENT = 100
 EVALUATIONS = 2_000_000  # as `simulate` has it
 
 
-@verb(lacks="seat columns")
+@verb(
+    lacks="seat columns",
+    time="Duration, as 2s or 300ms; default: ten cycles of the stated motion.",
+    steps="Equal intervals of time in the result.",
+    tolerance="Relative tolerance of the integration.",
+    steady="The cycle that the motion comes to repeat, as `analyse` gives a cycle.",
+    evaluations="Evaluations of the forces, after which the motion ends.",
+    kind="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit; of a steady "
+    "cycle those of `trunnion plot`.",
+)
 def simulate(
-    model: Model, files: Files,
-    time: Annotated[
-        str | None, Option("--time", help="Duration, as 2s or 300ms; default: ten cycles of the stated motion.")
-    ] = None,
-    steps: Annotated[int, Option("--steps", help="Equal intervals of time in the result.")] = 1000,
-    tolerance: Annotated[float, Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
-    steady: Annotated[
-        bool, Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle.")
-    ] = False,
-    evaluations: Annotated[
-        int, Option("--evaluations", help="Evaluations of the forces, after which the motion ends.")
-    ] = EVALUATIONS,
-    kind: Annotated[
-        str | None,
-        Option("--kind",
-               help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit; "
-               "of a steady cycle those of `trunnion plot`."),
-    ] = None,
+    model: Model, files: Files, time: str | None = None, steps: int = 1000, tolerance: float = 1e-9,
+    steady: bool = False, evaluations: int = EVALUATIONS, kind: str | None = None,
 ) -> None:  # fmt: skip
     """Motion in time: start-up, run-down, rest, locking, pins in play.
 
@@ -227,13 +191,8 @@ def simulate(
 MOST_RANGES = 24  # rows of the table of ranges
 
 
-@verb(lacks="report")
-def locking(
-    model: Model, files: Files, steps: Steps = 360,
-    near: Annotated[
-        float, Option("--near", help="Locking margin below which a position counts as near locking.")
-    ] = 1.5,
-) -> None:  # fmt: skip
+@verb(lacks="report", near="Locking margin below which a position counts as near locking.")
+def locking(model: Model, files: Files, steps: int = 360, near: float = 1.5) -> None:
     """Margin against locking by friction; backdriving.
 
     The margin for the friction of all joints and of each joint alone, and the ranges of the drive in which the

@@ -1,4 +1,4 @@
-"""The options that verbs share, each stated once: those of the model, of the files and of friction go in groups."""
+"""The options of the verbs: what is shared is declared once, by its name; a model, files and friction are groups."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from typer import Argument, Option
 
@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from trunnion.solve.friction_method import FrictionMethod
 
 __all__ = [
-    "CURVES", "DATA", "IMAGES", "PLOT_KINDS", "WRITTEN", "At", "DataFiles", "Engine", "Files", "Force", "Friction",
-    "Jobs", "MappingFile", "Measures", "Model", "OnePosition", "Picture", "Samples", "Seed", "Steps", "Uncut",
-    "Write", "named", "named_file", "over", "placed", "points", "seconds", "setting", "share",
+    "CURVES", "DATA", "IMAGES", "ONE_POSITION", "OPTIONS", "PLOT_KINDS", "WRITTEN", "Files", "Friction", "Model",
+    "named", "named_file", "over", "placed", "points", "seconds", "setting", "share",
 ]  # fmt: skip
 
 IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
@@ -29,51 +28,51 @@ PLOT_KINDS = (
 DATA = "Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable."  # of --out where no figure is written
 WRITTEN = "Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
 CURVES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
+ONE_POSITION = "One position instead of the cycle: 60deg, 20mm, 0.1s."  # of --at
+
+# by the name of the parameter: what it does, where a verb says nothing else; the flag follows from the name
+OPTIONS: dict[str, Any] = {
+    "file": Argument(help="Model file: YAML, JSON or TOML."),
+    "set": "Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable.",
+    "table": "NAME=FILE.csv: points of a driver or table, two columns. Repeatable.",
+    "friction": "off, or a friction law for all joints with friction.",
+    "seat": "loaded or free: position of the pins in all joints with play.",
+    "out": Option("--out", "-o", help=WRITTEN),
+    "report": "Also write the report, one HTML file.",
+    "units_row": "Second CSV header row with the units.",
+    "units": "Units of table files: si, or model for those of the model file.",
+    "columns": "Columns of a table file: usual, motion (velocities, accelerations), locking, all, names. Repeatable.",
+    "friction_method": Option(
+        "--friction-method", "--method", help="newton, or successive-approximation (Durango et al., 2010)."
+    ),
+    "criterion": "Friction iteration: largest change of a load, N, at convergence; default: by the residual.",
+    "iterations": "Limit of friction iterations.",
+    "steps": "Equally spaced positions over the turn or range.",
+    "at": "Position for measures that state none: 60deg, 20mm, 0.1s.",
+    "measure": "A measure of the model, or rocker.C.x, angle:rocker, effort:A … (check --list). Repeatable.",
+    "samples": "Number of random mechanisms.",
+    "seed": "Seed of the random numbers; the same seed gives the same result.",
+    "jobs": "Number of processes; default: one per core for long work.",
+    "engine": "numpy, compiled, or auto: by size.",
+    "uncut": "Show peaks near dead centres in full; default: cut at the frame.",
+    "write": "Write the model with the values found: .yaml or .json.",
+    "force": "With --write: allow overwriting the input itself.",
+    "mapping": Argument(help="Mapping of the data: YAML, JSON or TOML."),
+    "data": Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS, NetCDF."),
+}
 
 TableUnits = StrEnum("TableUnits", ["si", "model"])
-
-Steps = Annotated[int, Option("--steps", help="Equally spaced positions over the turn or range.")]
-At = Annotated[str | None, Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.")]
-OnePosition = Annotated[str | None, Option("--at", help="One position instead of the cycle: 60deg, 20mm, 0.1s.")]
-Measures = Annotated[
-    list[str] | None,
-    Option(
-        "--measure", help="A measure of the model, or rocker.C.x, angle:rocker, effort:A … (check --list). Repeatable."
-    ),
-]
-Samples = Annotated[int, Option("--samples", help="Number of random mechanisms.")]
-Seed = Annotated[int, Option("--seed", help="Seed of the random numbers; the same seed gives the same result.")]
-Jobs = Annotated[int | None, Option("--jobs", help="Number of processes; default: one per core for long work.")]
-Engine = Annotated[str, Option("--engine", help="numpy, compiled, or auto: by size.")]
-Uncut = Annotated[bool, Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")]
-Picture = Annotated[str, Option("--format", help="png, svg, pdf or jpg, for a folder of figures.")]
-Write = Annotated[Path | None, Option("--write", help="Write the model with the values found: .yaml or .json.")]
-Force = Annotated[bool, Option("--force", help="With --write: allow overwriting the input itself.")]
-MappingFile = Annotated[Path, Argument(help="Mapping of the data: YAML.")]
-DataFiles = Annotated[
-    list[Path] | None, Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS, NetCDF.")
-]
 
 
 @dataclass
 class Model:
     """The model file, with the numbers and laws that stand in for its own."""
 
-    file: Annotated[Path, Argument(help="Model file: YAML, JSON or TOML.")]
-    set_: Annotated[
-        list[str] | None,
-        Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
-    ] = None
-    table: Annotated[
-        list[str] | None,
-        Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
-    ] = None
-    friction: Annotated[
-        str | None, Option("--friction", help="off, or a friction law for all joints with friction.")
-    ] = None
-    seat: Annotated[
-        str | None, Option("--seat", help="loaded or free: position of the pins in all joints with play.")
-    ] = None
+    file: Path
+    set_: list[str] | None = None
+    table: list[str] | None = None
+    friction: str | None = None
+    seat: str | None = None
 
     def read(self, swept: Mapping[str, float | str] | None = None) -> "Mechanism":
         """The model with the options applied: `--table` and `--seat` first, then `--friction` together with `--set`.
@@ -132,41 +131,26 @@ def placed(findings: Iterable[Finding], file: Path, sections: Iterable[str] = ()
 class Files:
     """Where a result goes, and what its tables have."""
 
-    out: Annotated[list[Path] | None, Option("--out", "-o", help=WRITTEN)] = None
-    report: Annotated[Path | None, Option("--report", help="Also write the report, one HTML file.")] = None
-    units_row: Annotated[bool, Option("--units-row", help="Second CSV header row with the units.")] = False
-    units: Annotated[
-        TableUnits, Option("--units", help="Units of table files: si, or model for those of the model file.")
-    ] = TableUnits.si
-    columns: Annotated[
-        list[str] | None,
-        Option(
-            "--columns",
-            help="Columns of a table file: usual, motion (velocities, accelerations), locking, all, or names. "
-            "Repeatable.",
-        ),
-    ] = None
+    out: list[Path] | None = None
+    report: Path | None = None
+    units_row: bool = False
+    units: TableUnits = TableUnits.si
+    columns: list[str] | None = None
 
 
 @dataclass
 class Friction:
     """How friction and reactions are settled."""
 
-    method: Annotated[
-        str, Option("--friction-method", "--method", help="newton, or successive-approximation (Durango et al., 2010).")
-    ] = "newton"
-    criterion: Annotated[
-        float | None,
-        Option("--criterion",
-               help="Friction iteration: largest change of a load, N, at convergence; default: by the residual."),
-    ] = None  # fmt: skip
-    iterations: Annotated[int, Option("--iterations", help="Limit of friction iterations.")] = 200
+    friction_method: str = "newton"
+    criterion: float | None = None
+    iterations: int = 200
 
     def checked(self) -> "FrictionMethod":
         """The method; MechanismError for a name that there is not."""
         from trunnion.solve.friction_method import FrictionMethod
 
-        return FrictionMethod(self.method, self.criterion, self.iterations)  # type: ignore[arg-type]  # it checks it
+        return FrictionMethod(self.friction_method, self.criterion, self.iterations)  # type: ignore[arg-type]  # it checks it
 
 
 # ---- what texts say -----------------------------------------------------------------------------------------------

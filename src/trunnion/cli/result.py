@@ -36,6 +36,9 @@ def check_files(files: Files, of: str = "", kind: str | None = None, drawn: bool
     drawn: whether figures can be written; instead: what writes them where they cannot.
     """
     others = IMAGES if drawn else ()
+    for key in ("units_row", "columns"):
+        if getattr(files, key) and not files.out:
+            raise MechanismError(Finding("has no effect without a file to write", key, "give --out too"))
     for path in files.out or ():
         if instead and path.suffix.lower() in IMAGES:
             what = f"cannot write a result as '{path.suffix.lower()}'"

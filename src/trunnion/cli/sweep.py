@@ -1,12 +1,10 @@
 """`trunnion sweep`: figures of the cycle over a grid of numbers of the model, as tables, files, curves and maps."""
 
 from pathlib import Path
-from typing import Annotated, Any
-
-from typer import Option
+from typing import Any
 
 from trunnion.cli.files import verb
-from trunnion.cli.options import IMAGES, Engine, Files, Model, Steps, Uncut, over, points
+from trunnion.cli.options import IMAGES, Files, Model, over, points
 from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.cli.terminal import bar, console, line
 from trunnion.errors import Finding, MechanismError, counted
@@ -14,32 +12,18 @@ from trunnion.errors import Finding, MechanismError, counted
 __all__ = ["sweep"]
 
 
-@verb(lacks="columns")
+@verb(
+    lacks="columns",
+    over="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Repeatable.",
+    measure="Result to show, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
+    x="The swept value on the x axis and in the rows of the table; default: the first.",
+    family="The swept value with one curve each, or on the y axis of a map; default: the second.",
+    kind="curves, or map: contours over two swept values.",
+    margin="Compute the locking margin too; takes many times as long.",
+)
 def sweep(
-    model: Model, files: Files,
-    over_: Annotated[
-        list[str],
-        Option("--over", help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Repeatable."),
-    ],
-    measure: Annotated[
-        list[str] | None,
-        Option(
-            "--measure",
-            help="Result to show, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
-        ),
-    ] = None,
-    x: Annotated[
-        str, Option("--x", help="The swept value on the x axis and in the rows of the table; default: the first.")
-    ] = "",
-    family: Annotated[
-        str,
-        Option("--family", help="The swept value with one curve each, or on the y axis of a map; default: the second."),
-    ] = "",
-    kind: Annotated[str, Option("--kind", help="curves, or map: contours over two swept values.")] = "curves",
-    margin: Annotated[
-        bool, Option("--margin", help="Compute the locking margin too; takes many times as long.")
-    ] = False,
-    steps: Steps = 360, uncut: Uncut = False, engine: Engine = "auto",
+    model: Model, files: Files, over_: list[str], measure: list[str] | None = None, x: str = "", family: str = "",
+    kind: str = "curves", margin: bool = False, steps: int = 360, uncut: bool = False, engine: str = "auto",
 ) -> None:  # fmt: skip
     """Results over a range of model values: tables, curves, maps.
 

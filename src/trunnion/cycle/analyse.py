@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -65,10 +65,20 @@ def analyse(
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
     unknown, the engine cannot do the mechanism, or there is no file for what is said of tables.
     """
+    from trunnion.results.export import check_format, save
+
     selection = Kept.read(variables, dtype)
     paths = [out] if isinstance(out, (str, os.PathLike)) else out
     saved = {"units_row": units_row, "columns": columns, "units": units}
-    return analysed(mechanism, steps, friction_method, progress, engine, selection, paths, saved, at).dataset
+    unused = [key for key, value in saved.items() if value not in (False, None, "si") and not paths]
+    if unused:
+        raise MechanismError(Finding("has no effect without a file to write", unused[0], "give out too"))
+    for path in paths:
+        check_format(path)
+    result = analysed(mechanism, steps, friction_method, progress, engine, selection, at).dataset
+    for path in paths:
+        save(result, path, **saved)  # type: ignore[arg-type]  # it checks them
+    return result
 
 
 @strict_arguments
@@ -80,33 +90,18 @@ def analysed(
     progress: Callable[[int], None] | None = None,
     engine: Engine = "auto",
     selection: Kept = ALL,
-    out: Sequence[str | os.PathLike[str]] = (),
-    saved: Mapping[str, Any] | None = None,
     at: float | str | None = None,
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
-    unused = [key for key, value in (saved or {}).items() if value not in (False, None, "si") and not out]
-    if unused:
-        raise MechanismError(Finding("has no effect without a file to write", unused[0], "give out too"))
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    if out:
-        from trunnion.results.export import check_format
-
-        for path in out:
-            check_format(path)
     time = None if at is None else _time(run, at)
     at_positions = positions(
         run, steps, method, progress, selection.margin, engine=engine, wanted=selection.variables, at=time
     )
-    result = result_of(run, at_positions, selection)
-    for path in out:
-        from trunnion.results.export import save
-
-        save(result.dataset, path, **(saved or {}))
-    return result
+    return result_of(run, at_positions, selection)
 
 
 def _time(run: Run, at: float | str) -> float:

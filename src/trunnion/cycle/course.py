@@ -387,7 +387,7 @@ class _Looking:
         """The variables of a walk at times, s."""
         names = {*self._names, "status", *(COMPARED if self.errs else ())}
         arrays = allocate(self.run.system, len(time), ["errors"] if self.errs else [], names)
-        fill_chunk(arrays, back, time, slice(None))
+        fill_chunk(arrays, back, slice(None))
         if "end_load" in self._names:  # what a joint does not have is no gap in a course
             for i, joint in enumerate(self.run.system.joints):
                 arrays["end_load"][i, bearing_ends(self.run.system.mechanism, joint) :] = 0.0

@@ -5,9 +5,9 @@ What is written of one walk into the arrays of a result is recorded once and run
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,7 @@ from trunnion.algebra.course import Accuracy, Courses, Solve
 from trunnion.algebra.namespace import Number
 from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, followed, like, margin_rows, stacked
-from trunnion.cycle.fill import (
-    COMPARED,
-    CONDITIONS,
-    Arrays,
-    allocate,
-    fill_chunk,
-    fill_errors,
-    fill_lanes,
-    write,
-)
+from trunnion.cycle.fill import COMPARED, CONDITIONS, Arrays, allocate, cells, fill_chunk, fill_errors
 from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.variables import OF_SOME_JOINTS, VARIABLES
@@ -49,25 +40,6 @@ PROBED = 64  # positions at which it is seen whether margins are followed
 UNDEFINED = ("efficiency_instant", "locking_margin", "contact_position")
 
 
-class _Row(NamedTuple):
-    """One variable of `_Cells`."""
-
-    name: str
-    numbers: dict[Cell, Number]
-
-    def __setitem__(self, place: Any, number: Number) -> None:
-        *cell, _ = place if isinstance(place, tuple) else (place,)
-        self.numbers[self.name, tuple(cell)] = number
-
-
-class _Cells(dict[str, _Row]):
-    """Stands for the arrays of a result while one walk is written into them, and keeps the number of every cell."""
-
-    def __init__(self, names: Iterable[str]) -> None:
-        self.numbers: dict[Cell, Number] = {}
-        super().__init__((name, _Row(name, self.numbers)) for name in names)
-
-
 class CycleKernel:
     """Every variable of a cycle at many positions.
 
@@ -79,12 +51,11 @@ class CycleKernel:
         self, run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod
     ) -> None:
         # not the arrays: the kernel and its figures hold each other, so whatever they hold is freed late
-        self._read = {name: bool(array.strides[-1]) for name, array in arrays.items()}
+        self._read = set(arrays)
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
             numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
-        read = (cell for cell, number in numbers.items() if self._wanted(cell, number))
-        self._names = {f"{name}{list(place)}": (name, place) for name, place in read}
+        self._names = {f"{cell[0]}{list(cell[1])}": cell for cell, number in numbers.items() if not _zero(cell, number)}
         self._kernel = WalkKernel(
             run,
             {name: self._figure(cell) for name, cell in self._names.items()},
@@ -115,23 +86,22 @@ class CycleKernel:
             row, column = rows[low : low + CHUNK], columns[low : low + CHUNK]
             times = time_of(time, row, column)
             back = self._kernel.back({path: lanes_of(value, row) for path, value in values.items()}, times)
-            fill_lanes(arrays, back, times, (row, column) if several else (column,), causes)
-
-    def _wanted(self, cell: Cell, number: Number) -> bool:
-        """Whether a cell is read, and not 0 whatever the values are, as most arrays are before."""
-        none = isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part not in OF_SOME_JOINTS
-        return self._read[cell[0]] and not none
+            fill_chunk(arrays, back, (row, column) if several else (column,), causes)
 
     def _cells(self, back: Backward) -> Mapping[Cell, Number]:
-        """The number of every cell, of one walk; those of the last one are remembered, for figures ask one by one."""
+        """The number of every cell that is read, of one walk; of the last one, for figures are asked one by one."""
         if self._last[0] is not back:
-            into = _Cells(self._read)
-            write(into, back, back.walk.time, slice(None))
-            self._last = back, into.numbers
+            numbers = {(name, place): number for name, place, number in cells(back, self._read) if name in self._read}
+            self._last = back, numbers
         return self._last[1]
 
     def _figure(self, cell: Cell) -> Figure:
         return lambda back: self._cells(back)[cell]
+
+
+def _zero(cell: Cell, number: Number) -> bool:
+    """Whether a cell is 0 whatever the values are, as most arrays are before they are filled."""
+    return isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part not in OF_SOME_JOINTS
 
 
 def kernel_of(
@@ -150,9 +120,8 @@ def kernel_of(
                 raise
             return None
 
-    read = tuple(name for name, array in arrays.items() if array.strides[-1])
     constants = frozenset(literals(values).items())  # what is 0 with these is left out
-    return run.once(("compiled", engine, method, read, constants), made)
+    return run.once(("compiled", engine, method, tuple(arrays), constants), made)
 
 
 def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
@@ -244,7 +213,7 @@ class Many:
         kernel = kernel_of(self.run, self.engine, values, time, arrays, method) if self.compiled else None
         if kernel is None:
             self.compiled = False
-            fill_chunk(arrays, self.run.solve(time, values, method), time, slice(None))
+            fill_chunk(arrays, self.run.solve(time, values, method), slice(None))
             return arrays
         kernel.fill(arrays, values, time)
         return arrays

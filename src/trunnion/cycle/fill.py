@@ -1,10 +1,10 @@
-"""What a walk came to, written into the arrays of a result: every variable, in the plane and in space, what errors
-change, and nothing where a status rules it out."""
+"""What a walk comes to, as the arrays of a result have it: every number of every variable by its place, in the plane
+and in space, what errors change, and NaN where a status rules a number out."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,13 +31,14 @@ from trunnion.solve.status import status_of
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "COMPARED", "CONDITIONS", "Arrays", "Into", "allocate", "blank", "fill_bearing", "fill_chunk", "fill_errors",
-    "fill_joint", "fill_lanes", "labels", "pin_area", "put", "unwrap", "write",
+    "COMPARED", "CONDITIONS", "Arrays", "Cell", "allocate", "blank", "cells", "fill_chunk", "fill_errors", "labels",
+    "pin_area", "unwrap",
 ]  # fmt: skip
 
-Arrays = dict[str, NDArray[np.float64]]
-Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
+Array = NDArray[np.float64]
+Arrays = dict[str, Array]
 Vector = Sequence[Number]
+Cell = tuple[str, tuple[int, ...], Number]  # variable, place in its array but for the position, number
 CONDITIONS = "module_condition"  # (module, …, position), beside the variables of a result where somebody asks for it
 POSES = [
     *("point_position", "link_angle", "link_position", "link_rotation", "joint_rotation", "joint_slide"),
@@ -46,8 +47,9 @@ POSES = [
 RATES = [name for name in results.VARIABLES if name.endswith(("velocity", "acceleration"))]
 # with them what follows from them: of loads that are not known neither the seats are, nor what errors change
 APART = {*POSES, *RATES, "locking_margin", "seat_change", "contact_loss_number"}
-FORCES = [name for name, own in results.VARIABLES.items() if own.dtype is np.float64 and name not in APART]
+FORCES = [name for name, variable in results.VARIABLES.items() if variable.dtype is np.float64 and name not in APART]
 AXES = "xyz"
+DERIVATIVES = ("", "_velocity", "_acceleration")
 DIFFERENCES = {
     "point_error": "point_position",
     "joint_slide_error": "joint_slide",
@@ -82,62 +84,73 @@ def labels(system: System) -> dict[str, list[str]]:
 def allocate(
     system: System, positions: int, parts: Sequence[str] = (), wanted: Collection[str] | None = None
 ) -> Arrays:
-    """Arrays for the variables of a system, see `results.variables.allocate`."""
+    """Arrays to be filled, position last. wanted: the variables, all that the system has if not given.
+
+    parts: of the variables that not every result has, such as "errors".
+    """
     names = labels(system) | ({"end": ["1", "2"]} if "seats" in parts else {})
     if "bearing_end" in names or any(has_pressure(system.mechanism, joint) for joint in system.joints):
         parts = [*parts, "bearings"]
-    return results.allocate(names, positions, parts, wanted)
+    arrays: Arrays = {}
+    for name, variable in results.variables(system.mechanism.space).items():
+        if (variable.part and variable.part not in parts) or (wanted is not None and name not in wanted):
+            continue
+        if name in results.SAME_AS or not names.keys() >= set(variable.dims):  # no springs, no spring_force
+            continue
+        # zeroed pages take no memory until something is written: rows of the ground and slides of pins never are
+        arrays[name] = np.zeros((*(len(names[dim]) for dim in variable.dims), positions), variable.dtype)
+        if variable.part in results.OF_SOME_JOINTS and variable.dtype is np.float64:
+            arrays[name][:] = np.nan  # of joints and ends that have none
+    return arrays | {name: arrays[other] for name, other in results.SAME_AS.items() if other in arrays}
+
+
+def _vector(name: str, place: tuple[int, ...], numbers: Iterable[Number]) -> Iterator[Cell]:
+    return ((name, (*place, k), number) for k, number in enumerate(numbers))
 
 
 # ---- motion ---------------------------------------------------------------------------------------------------
 
 
-def fill_motion(arrays: Into, walk: Forward, window: slice) -> None:
-    """Angles or frames of links, points and joints of one chunk."""
+def _motion(walk: Forward) -> Iterator[Cell]:
+    """Angles or frames of links, points and joints."""
     system = walk.system
     for i, (link, name) in enumerate(system.points):
         for key, numbers in zip(("position", "velocity", "acceleration"), walk.point(link, name), strict=True):
-            put(arrays[f"point_{key}"], i, numbers, window)
+            yield from _vector(f"point_{key}", (i,), numbers)
     if isinstance(walk, SpatialWalk):
         for i, link in enumerate(system.mechanism.effective_links):
             frame, twist, second = walk.motions[link]
-            put(arrays["link_rotation"], i, quaternion(frame), window)
-            put(arrays["link_position"], i, frame.place, window)
-            put(arrays["link_angular_velocity"], i, twist.u, window)
-            put(arrays["link_angular_acceleration"], i, second.u, window)
+            yield from _vector("link_rotation", (i,), quaternion(frame))
+            yield from _vector("link_position", (i,), frame.place)
+            yield from _vector("link_angular_velocity", (i,), twist.u)
+            yield from _vector("link_angular_acceleration", (i,), second.u)
         for i, joint in enumerate(system.joints):
-            fill_joint(arrays, walk, i, joint, window)
+            yield from _joint_in_space(walk, i, joint)
         return
     for i, link in enumerate(system.mechanism.links):
         if link != system.mechanism.fixed_link:
             motion = walk.motions[link]
-            arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
-            arrays["link_angle_velocity"][i, window] = motion.twist.w
-            arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
+            yield "link_angle", (i,), np.arctan2(motion.frame.s, motion.frame.c)
+            yield "link_angle_velocity", (i,), motion.twist.w
+            yield "link_angle_acceleration", (i,), motion.acceleration.w
     for i, joint in enumerate(system.joints):
         slides = not system.turns(joint)
         name = "joint_slide" if slides else "joint_rotation"
-        arrays[f"{name}_velocity"][i, window] = walk.rates(joint)[slides]
-        arrays[f"{name}_acceleration"][i, window] = walk.second_rates(joint)[slides]
+        yield f"{name}_velocity", (i,), walk.rates(joint)[slides]
+        yield f"{name}_acceleration", (i,), walk.second_rates(joint)[slides]
         if slides:
-            arrays[name][i, window] = walk.coordinates(joint)[1]
+            yield name, (i,), walk.coordinates(joint)[1]
 
 
-def put(array: Any, i: int, numbers: Sequence[Number], window: slice) -> None:
-    """The components of the i-th vector."""
-    for axis, number in enumerate(numbers):
-        array[i, axis, window] = number
-
-
-def fill_joint(arrays: Into, walk: SpatialWalk, i: int, joint: str, window: slice) -> None:
-    """Rotation and slide of one joint with their derivatives; of balls and crosses the angle between their elements."""
+def _joint_in_space(walk: SpatialWalk, i: int, joint: str) -> Iterator[Cell]:
+    """Rotation and slide of a joint with their derivatives; of balls and crosses the angle between their elements."""
     pair = walk.pair(joint)
     if pair.one_axis or pair.angle:
         both = zip(walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint), strict=True)
         for name, values in zip(("joint_rotation", "joint_slide"), both, strict=True):
             if pair.one_axis or name == "joint_rotation":
-                for suffix, value in zip(("", "_velocity", "_acceleration"), values, strict=True):
-                    arrays[name + suffix][i, window] = value
+                for suffix, value in zip(DERIVATIVES, values, strict=True):
+                    yield name + suffix, (i,), value
         return
     (first, second), (first_end, two) = walk.system.joints[joint][1], walk.ends(joint)
     turn = scaled(0.5, plus(plus(cross(first_end.x, two.x), cross(first_end.y, two.y)), cross(first_end.z, two.z)))
@@ -147,59 +160,60 @@ def fill_joint(arrays: Into, walk: SpatialWalk, i: int, joint: str, window: slic
         b - a for a, b in zip(walk.motions[first].acceleration.u, walk.motions[second].acceleration.u, strict=True)
     )
     speed = np.sqrt(dot(spin, spin))
-    arrays["joint_rotation"][i, window] = np.arctan2(np.sqrt(dot(turn, turn)), cosine)
-    arrays["joint_rotation_velocity"][i, window] = speed
+    yield "joint_rotation", (i,), np.arctan2(np.sqrt(dot(turn, turn)), cosine)
+    yield "joint_rotation_velocity", (i,), speed
     moves = np.greater(speed, 0)
     rate = (spin[0] * change[0] + spin[1] * change[1] + spin[2] * change[2]) / np.where(moves, speed, 1.0)
-    arrays["joint_rotation_acceleration"][i, window] = np.where(moves, rate, 0.0)
+    yield "joint_rotation_acceleration", (i,), np.where(moves, rate, 0.0)
 
 
 # ---- forces ---------------------------------------------------------------------------------------------------
 
 
-def fill_forces(arrays: Into, back: Backward, window: slice) -> None:
-    """Reactions, friction, drive efforts, springs and gear pairs of one chunk; in space about the middles of the
-    bearings."""
+def _forces(back: Backward, read: Container[str]) -> Iterator[Cell]:
+    """Reactions, friction, drive efforts, springs and gear pairs; in space about the middles of the bearings."""
     walk, mechanism = back.walk, back.walk.system.mechanism
     for i, joint in enumerate(walk.system.joints):
-        turns = walk.system.turns(joint)
-        fill_bearing(arrays, walk, i, joint, back.reactions[joint], back.friction_wrenches[joint], window)
+        reaction, friction, turns = back.reactions[joint], back.friction_wrenches[joint], walk.system.turns(joint)
+        if "end_load" in read or "pin_pressure" in read:
+            yield from _bearing(walk, i, joint, reaction, friction)
         if turns:
-            arrays["friction_torque"][i, window] = back.friction[joint]
+            yield "friction_torque", (i,), back.friction[joint]
         if isinstance(walk, SpatialWalk):
-            middle, friction = bearing_middle(walk, joint), back.friction_wrenches[joint]
-            put(arrays["reaction_force"], i, back.reactions[joint].u, window)
-            put(arrays["reaction_moment"], i, moment_at(back.reactions[joint], middle), window)
-            put(arrays["friction_moment"], i, moment_at(friction, middle), window)
-            arrays["friction_force"][i, window] = dot(friction.u, walk.ends(joint)[1].z)
+            middle = bearing_middle(walk, joint)
+            yield from _vector("reaction_force", (i,), reaction.u)
+            yield from _vector("reaction_moment", (i,), moment_at(reaction, middle))
+            yield from _vector("friction_moment", (i,), moment_at(friction, middle))
+            yield "friction_force", (i,), dot(friction.u, walk.ends(joint)[1].z)
             continue
-        *force, moment = back.reactions[joint]
-        put(arrays["reaction_force"], i, force, window)
+        *force, moment = reaction
+        yield from _vector("reaction_force", (i,), force)
         if not turns:
-            arrays["friction_force"][i, window] = back.friction[joint]
-            arrays["reaction_moment"][i, window] = moment
+            yield "friction_force", (i,), back.friction[joint]
+            yield "reaction_moment", (i,), moment
     for i, name in enumerate(mechanism.drivers):
-        arrays["drive_effort"][i, window] = back.efforts[name]
+        yield "drive_effort", (i,), back.efforts[name]
     for i, name in enumerate(mechanism.springs):
-        arrays["spring_force"][i, window], arrays["spring_elongation"][i, window] = back.springs[name][:2]
+        yield "spring_force", (i,), back.springs[name].force
+        yield "spring_elongation", (i,), back.springs[name].elongation
     for i, name in enumerate(mechanism.gears):
-        arrays["gear_torque"][i, window] = back.gears[name].torque
-        put(arrays["gear_force"], i, back.gears[name].force, window)
+        yield "gear_torque", (i,), back.gears[name].torque
+        yield from _vector("gear_force", (i,), back.gears[name].force)
 
 
-def fill_bearing(arrays: Into, walk: Forward, i: int, joint: str, reaction: Any, friction: Any, window: slice) -> None:
-    """Loads on the ends of one joint's bearing or guide, and the pressure of its pin, where somebody reads them."""
+def _bearing(walk: Forward, i: int, joint: str, reaction: Any, friction: Any) -> Iterator[Cell]:
+    """Loads on the ends of a joint's bearing or guide, and the pressure of its pin."""
     mechanism = walk.system.mechanism
     ends, pressed = bearing_ends(mechanism, joint) > 0, has_pressure(mechanism, joint)
-    if not ((ends and _is_read(arrays["end_load"])) or (pressed and _is_read(arrays["pin_pressure"]))):
-        return
-    loads = loads_on_ends(walk, joint, reaction, friction) if ends else [(0.5 * reaction.x, 0.5 * reaction.y, 0.0)]
-    for end, load in enumerate(loads if ends else ()):
-        for axis in range(mechanism.coordinates):
-            arrays["end_load"][i, end, axis, window] = load[axis]
+    if ends:
+        loads = loads_on_ends(walk, joint, reaction, friction)
+        for end, load in enumerate(loads):
+            yield from _vector("end_load", (i, end), load[: mechanism.coordinates])
+    elif pressed:
+        loads = [(0.5 * reaction.x, 0.5 * reaction.y, 0.0)]
     if pressed:
         most = functools.reduce(np.maximum, (np.sqrt(dot(load, load)) for load in loads))
-        arrays["pin_pressure"][i, window] = 2 * most / pin_area(walk.values, joint)
+        yield "pin_pressure", (i,), 2 * most / pin_area(walk.values, joint)
 
 
 def pin_area(values: Values, joint: str) -> Number:
@@ -207,44 +221,52 @@ def pin_area(values: Values, joint: str) -> Number:
     return 2 * values[f"joints.{joint}.pin.radius"] * values[f"joints.{joint}.pin.bearing"]
 
 
-def _is_read(array: Any) -> bool:
-    """Whether what is written into an array of `allocate` is read, as is all that stands for one."""
-    return bool(getattr(array, "strides", (1,))[-1])
-
-
-def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> None:
+def _powers(back: Backward) -> Iterator[Cell]:
     """Power of drivers, loads, springs and friction, and what is left over: their sum with inertia and gravity."""
     walk = back.walk
     total: Number = back.body_power + back.gear_power
     for power in back.load_powers.values():
         total = total + power
     for i, name in enumerate(walk.system.joints):
-        lost = back.losses[name]
-        arrays["friction_power"][i, window] = lost
-        total = total - lost
+        yield "friction_power", (i,), back.losses[name]
+        total = total - back.losses[name]
     for i, state in enumerate(back.springs.values()):
-        arrays["spring_power"][i, window] = state.power
-        arrays["damping_power"][i, window] = state.loss
+        yield "spring_power", (i,), state.power
+        yield "damping_power", (i,), state.loss
         total = total + state.power
     driven: Number = 0.0
     for i, name in enumerate(walk.system.mechanism.drivers):
-        power = back.efforts[name] * walk.system.drive(walk.values, name, time)[1]
-        arrays["drive_power"][i, window] = power
+        power = back.efforts[name] * walk.system.drive(walk.values, name, walk.time)[1]
+        yield "drive_power", (i,), power
         driven = driven + power
     useful: Number = 0.0
     for power in useful_powers(walk, back.load_powers, back.springs):
         useful = useful - power
-    arrays["useful_power"][window] = useful
     defined = np.greater(driven, 0) & has_useful_work(walk.system.mechanism)
-    arrays["efficiency_instant"][window] = useful / np.where(defined, driven, np.nan)
-    arrays["power_residual"][window] = total + driven
+    yield "useful_power", (), useful
+    yield "efficiency_instant", (), useful / np.where(defined, driven, np.nan)
+    yield "power_residual", (), total + driven
+
+
+def _solution(back: Backward) -> Iterator[Cell]:
+    """How near to locking and to a dead centre it is, and how well it is solved."""
+    for figure in ("iterations", "change", "residual", "contraction"):  # of the friction iteration
+        worst = functools.reduce(np.maximum, (getattr(settled, figure) for settled in back.settled), 0.0)
+        yield f"friction_{figure}", (), worst
+    yield "locking_margin", (), locking_margin(back)
+    groups = list(zip(back.walk.system.groups, back.walk.poses, strict=True))
+    conditions = [group.condition(pose) for group, pose in groups]
+    yield "condition", (), functools.reduce(np.maximum, conditions, 0.0)
+    yield "closure_residual", (), functools.reduce(np.maximum, (group.closure(pose) for group, pose in groups), 0.0)
+    for i, condition in enumerate(conditions):
+        yield CONDITIONS, (i,), condition
 
 
 # ---- seats and errors -----------------------------------------------------------------------------------------------
 
 
-def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
-    """Seats, end forces and places of contact of one chunk."""
+def _seats(back: Backward) -> Iterator[Cell]:
+    """Seats, end forces and places of contact."""
     walk = back.walk
     joints, axes = list(walk.system.joints), walk.system.mechanism.coordinates
     for seat in seats(walk.system.mechanism, walk.values):
@@ -254,8 +276,8 @@ def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
         contacts = _contacts(walk, seat, ends)
         for name, vectors in (("seat_offset", ends), ("end_force", loads), ("contact_position", contacts)):
             for end, vector in vectors.items():
-                put(arrays[name][i], end, vector[:axes], window)
-        _describe(arrays, i, window, walk, seat, ends)
+                yield from _vector(name, (i, end), vector[:axes])
+        yield from _direction(walk, i, seat, ends)
 
 
 def _ends(seat: GivenSeat, vectors: Sequence[Vector], shared: bool = False) -> dict[int, list[Number]]:
@@ -268,7 +290,7 @@ def _ends(seat: GivenSeat, vectors: Sequence[Vector], shared: bool = False) -> d
     return loads
 
 
-def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> None:
+def _direction(walk: Forward, i: int, seat: GivenSeat, ends: Mapping[int, Vector]) -> Iterator[Cell]:
     """β and ξ of a pin or guide; of a ball there are none."""
     model = seat.play.model
     if len(model.ends[0]) == 3:
@@ -279,11 +301,11 @@ def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSea
     else:  # a guide of the plane is told from its normal
         guide = len(model.ends[0]) == 1 and len(model.ends) == 2
         beta, xi = describing(*((ends[end][1], 0.0) if guide else (ends[end][0], ends[end][1]) for end in (0, 1)))
-    arrays["seat_beta"][i, window], arrays["seat_xi"][i, window] = beta, xi
+    yield "seat_beta", (i,), beta
+    yield "seat_xi", (i,), xi
     if walk.system.turns(seat.joint):
         first_frame, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
-        turn = walk.coordinate(seat.joint, first_frame, two)
-        arrays["seat_xi_pin"][i, window] = wrapped(xi + turn)
+        yield "seat_xi_pin", (i,), wrapped(xi + walk.coordinate(seat.joint, first_frame, two))
 
 
 def _contacts(walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> dict[int, Vector]:
@@ -313,19 +335,25 @@ def wrapped(angle: Number) -> Number:
 
 def fill_errors(arrays: Arrays, ideal: Arrays, system: System, window: slice) -> None:
     """Differences of one chunk to the ideal mechanism's results, which hold that chunk alone; NaN without an answer."""
-    for name, of in DIFFERENCES.items():
-        np.subtract(arrays[of][..., window], ideal[of], out=arrays[name][..., window])  # no copy: half the time
-    if "link_angle" in arrays:
+    differences: dict[str, Array] = {}
+    if system.mechanism.space == "planar":
         links, turned = labels(system)["link"], wrapped(arrays["link_angle"][:, window] - ideal["link_angle"])
-        arrays["link_error"][:, window] = turned
-        for i, (_, (first, second)) in enumerate(system.joints.values()):
-            arrays["joint_rotation_error"][i, window] = turned[links.index(second)] - turned[links.index(first)]
+        pairs = [[links.index(link) for link in ends] for _, ends in system.joints.values()]
+        differences["link_error"] = turned
+        differences["joint_rotation_error"] = np.array([turned[second] - turned[first] for first, second in pairs])
     else:
-        for i, (built, meant) in enumerate(zip(arrays["link_rotation"], ideal["link_rotation"], strict=True)):
-            arrays["link_error"][i, :, window] = _rotation_vector(built[:, window], meant)
         turned = wrapped(arrays["joint_rotation"][:, window] - ideal["joint_rotation"])
-        arrays["joint_rotation_error"][:, window] = turned
-    blank(arrays, arrays["status"][window].astype(np.int8), window)
+        differences["joint_rotation_error"] = turned
+        if "link_error" in arrays:
+            frames = zip(arrays["link_rotation"][..., window], ideal["link_rotation"], strict=True)
+            differences["link_error"] = np.array([_rotation_vector(built, meant) for built, meant in frames])
+    for name, difference in differences.items():
+        if name in arrays:
+            arrays[name][..., window] = difference
+    for name, of in DIFFERENCES.items():
+        if name in arrays:
+            np.subtract(arrays[of][..., window], ideal[of], out=arrays[name][..., window])  # no copy: half the time
+    blank(arrays, arrays["status"][window].astype(np.int8), (window,))
 
 
 def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -339,71 +367,55 @@ def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> 
     return np.asarray(sign * share * vector)
 
 
-# ---- whole walks ----------------------------------------------------------------------------------------------------
+# ---- all of a walk --------------------------------------------------------------------------------------------------
+
+
+def cells(back: Backward, read: Container[str]) -> Iterator[Cell]:
+    """Every number of a walk but its status, by its variable and its place there.
+
+    read: the variables that somebody reads; others may be left out.
+    """
+    yield from _motion(back.walk)
+    yield from _forces(back, read)
+    yield from _powers(back)
+    yield from _solution(back)
+    if "seat_offset" in read:
+        yield from _seats(back)
 
 
 def fill_chunk(
     arrays: Arrays,
     back: Backward,
-    time: NDArray[np.float64],
-    window: slice,
+    at: slice | tuple[NDArray[np.intp], ...],
     causes: Causes | None = None,
 ) -> None:
-    """Write one chunk into the result; what a status rules out becomes NaN."""
-    status = status_of(back, arrays["status"][window].shape)
-    arrays["status"][window] = status
+    """Write a walk into the arrays of a result; what a status rules out becomes NaN.
+
+    Parameters
+    ----------
+    arrays
+        Those of `allocate`, of which there need not be all.
+    back
+        The walk.
+    at
+        Where its positions lie along the last dims: a window, or an index for each of these dims.
+    causes
+        To note why positions have no answer.
+    """
+    index = (at,) if isinstance(at, slice) else at
+    status = status_of(back, arrays["status"][index].shape)
+    arrays["status"][index] = status
     if causes:
-        causes.note(back, status, np.arange(window.start, window.stop))
+        causes.note(back, status, np.arange(at.start, at.stop) if isinstance(at, slice) else at[-1])
     with np.errstate(all="ignore"):
-        write(arrays, back, time, window)
-    blank(arrays, status, window)
+        for name, place, number in cells(back, arrays):
+            if name in arrays:
+                arrays[name][(*place, *index)] = number
+    blank(arrays, status, index)
 
 
-def fill_lanes(
-    arrays: Arrays,
-    back: Backward,
-    time: NDArray[np.float64],
-    lanes: tuple[NDArray[np.intp], ...],
-    causes: Causes | None = None,
-) -> None:
-    """The same of some positions, wherever they are: their numbers in the last dims of the arrays."""
-    place: Any = (..., *lanes)
-    varying = {name: array for name, array in arrays.items() if array.strides[-1]}
-    window = {name: array[place] for name, array in arrays.items()}
-    window |= {name: window[other] for name, other in results.SAME_AS.items() if name in window}
-    fill_chunk(window, back, time, slice(0, len(lanes[-1])))
-    if causes:
-        causes.note(back, window["status"].astype(np.int8), lanes[-1])
-    for name, array in varying.items():
-        # rows that stay as they are may be zeros that take no memory until they are written
-        for row in np.argwhere(np.any(window[name] != array[place], axis=-1)):
-            array[(*row, *lanes)] = window[name][tuple(row)]
-
-
-def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
-    """Every variable but the status, of one walk."""
-    fill_motion(arrays, back.walk, window)
-    fill_forces(arrays, back, window)
-    for figure in ("iterations", "change", "residual", "contraction"):  # of the friction iteration
-        worst = functools.reduce(np.maximum, (getattr(settled, figure) for settled in back.settled), 0.0)
-        arrays[f"friction_{figure}"][window] = worst
-    arrays["locking_margin"][window] = locking_margin(back)
-    fill_power(arrays, back, time, window)
-    if "seat_offset" in arrays:
-        fill_seats(arrays, back, window)
-    groups = list(zip(back.walk.system.groups, back.walk.poses, strict=True))
-    conditions = [group.condition(pose) for group, pose in groups]
-    arrays["condition"][window] = functools.reduce(np.maximum, conditions, 0.0)
-    arrays["closure_residual"][window] = functools.reduce(
-        np.maximum, (group.closure(pose) for group, pose in groups), 0.0
-    )
-    if CONDITIONS in arrays:
-        for i, condition in enumerate(conditions):
-            arrays[CONDITIONS][i, window] = condition
-
-
-def blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
-    """NaN for every number that a status rules out."""
+def blank(arrays: Arrays, status: NDArray[np.int8], index: tuple[Any, ...]) -> None:
+    """NaN for every number that a status rules out. index: of the positions, along the last dims."""
     if not np.any(status >= Status.NOT_CONVERGED):
         return
     for names, where in (
@@ -415,7 +427,9 @@ def blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
     ):
         for name in names:
             if name in arrays:
-                arrays[name][..., window][..., where] = np.nan
+                numbers = arrays[name][(..., *index)]
+                numbers[..., where] = np.nan
+                arrays[name][(..., *index)] = numbers
 
 
 # ---- angles that run on ---------------------------------------------------------------------------------------
@@ -427,7 +441,7 @@ def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.floa
     A driven rotation is the prescribed coordinate itself, whole turns included.
     """
     spatial = system.mechanism.space == "spatial"
-    if not arrays["joint_rotation" if spatial else "link_angle"].strides[-1]:  # nobody reads them
+    if ("joint_rotation" if spatial else "link_angle") not in arrays:  # nobody reads them
         return
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
     places = {link: i for i, link in enumerate(labels(system)["link"])}

@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss
 from trunnion.cycle.course import CycleCourse, Means, course_of, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.model_findings import far_hints, of_run
@@ -42,7 +41,6 @@ Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
 CLASS_TWO = 2
-NEXT = 1e-3  # of the multiple at which one group locks: another that locks at less is told beside it
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 RESOLVED = 1e-7  # of its largest value: a resistance that is below 0 by less is 0, for so well its course is known
@@ -102,15 +100,8 @@ def listed(places: Sequence[str]) -> str:
 
 def findings(cycle: Cycle) -> list[Finding]:
     """What is to be known of a mechanism over its cycle."""
-    return [finding for question in QUESTIONS for finding in question(cycle)]
-
-
-# ---- the model ------------------------------------------------------------------------------------------------
-
-
-def _of_the_model(cycle: Cycle) -> list[Finding]:
-    """What the model says that this analysis leaves out, how it was assembled, and what statics leaves open."""
-    return of_run(cycle.run, cycle.run.once("far hints", lambda: list(far_hints(cycle.run))))
+    hints = cycle.run.once("far hints", lambda: list(far_hints(cycle.run)))
+    return [*of_run(cycle.run, hints), *(finding for question in QUESTIONS for finding in question(cycle))]
 
 
 def effort_units(system: System) -> list[str]:
@@ -123,9 +114,9 @@ def effort_units(system: System) -> list[str]:
 
 def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
     """Modules that do not close, and by how much."""
-    dial, mechanism = cycle.at.dial, cycle.mechanism
+    dial, system = cycle.at.dial, cycle.run.system
     for (number, *reasons), (places, sizes) in sorted(cycle.at.causes.of("open").items(), key=lambda item: item[0][0]):
-        module, at = cycle.run.system.plan.modules[number], dial.intervals(places)
+        module, at = system.plan.modules[number], dial.intervals(places)
         everywhere, where = len(places) == len(dial.values) > 1, f"links {', '.join(module.links)}"
         nowhere = f"cannot be assembled {'at any position' if everywhere else at}"
         remedy = "change the lengths or the range of the driver"
@@ -133,77 +124,63 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
             gaps = {reason: np.nanmax(row) for reason, row in zip(reasons, sizes, strict=True) if np.any(row > 0)}
             by = "; ".join(f"{name} by up to {readable(size, 'm')}" for name, size in gaps.items())
             what = f"{nowhere}: {by or 'an earlier group has no position'}"
-            yield Finding.error("assembly.gap", where, what, remedy, at=at, everywhere=everywhere, gaps=gaps)
-            continue
-        if past := _past_dead_centre(cycle, places):
-            driver, moved = past
-            what = (
-                f"has no position {at}: {moved} is past a dead centre of {driver}, which cannot move it on from there"
-            )
+            yield Finding.error("assembly.gap", where, what, remedy, at=at, gaps=gaps)
+        elif (driver := _past_dead_centre(cycle, places)) and system.inverse:
+            what = f"has no position {at}: {system.inverse.moves[driver]} is past a dead centre of {driver}, which "
+            what += "cannot move it on from there"
             remedy = "end the motion before it"
             yield Finding.error("assembly.past_dead_centre", f"drivers.{driver}.moves", what, remedy, at=at)
-            continue
-        start, redundant, errors = bool(np.any(places == 0)), bool(module.redundant), mechanism.has_errors
-        why = "these links do not close"
-        if everywhere and redundant and errors:
-            why = "these links are over-constrained; with their errors they need play to fit together, and as rigid "
-            why += "parts they cannot be analysed"
-            remedy = "see `trunnion assemble FILE` for the play that they need"
-        elif everywhere and redundant:
-            remedy = "the group is over-constrained and closes with special dimensions only: check them, "
-            remedy += "or use joints with more freedoms (cylindrical, spherical)"
-        elif not everywhere:
-            unreached = "these links cannot reach it from the start without being taken apart"
-            why = f"{why} there, where the motion starts" if start else unreached
-        figures = {"at": at, "everywhere": everywhere, "start": start}
-        yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, **figures)
+        else:
+            why = "these links do not close" if everywhere or np.any(places == 0) else "not reached from the start"
+            if everywhere and module.redundant:
+                why = "these links are over-constrained and close with special dimensions only"
+                remedy = "see `trunnion assemble` for the play that they need, or use joints with more freedoms"
+            yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, at=at)
 
 
-def _past_dead_centre(cycle: Cycle, places: NDArray[np.intp]) -> tuple[str, str] | None:
-    """The driver, and the joint that it moves, of positions at which it cannot; None where there is another cause."""
+def _past_dead_centre(cycle: Cycle, places: NDArray[np.intp]) -> str | None:
+    """The driver that cannot move another joint to some positions; None where there is another cause."""
     system, time = cycle.run.system, cycle.at.time[places]
-    for name, joint in (system.inverse.moves if system.inverse else {}).items():
-        coordinate, rate, _ = (
-            np.broadcast_to(number, time.shape) for number in system.drive(cycle.run.values, name, time)
-        )
+    for name in system.inverse.moves if system.inverse else ():
+        coordinate, rate, _ = system.drive(cycle.run.values, name, time)
         if np.all(np.isnan(coordinate) & np.isfinite(rate)):
-            return name, joint
+            return name
     return None
 
 
-def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
-    """Where only the travel of seats decides the sense of a friction."""
-    for places, _ in cycle.at.causes.of("stuck").values():
-        places = places[cycle.at.arrays["status"][places] == Status.ZERO_SLIP]
-        if len(places):
-            what = f"a joint with friction reverses {cycle.at.dial.intervals(places)} while its pin moves within its "
-            what += "play: friction may act either way there, and the seat changes with it"
-            yield Finding.note("friction.sense", "joints", what, at=cycle.at.dial.intervals(places))
-
-
-def _singular(cycle: Cycle) -> Iterator[Finding]:
-    """Modules that are singular."""
-    condition = cycle.at.arrays["condition"]
-    for number, (places, _) in cycle.at.causes.of("singular").items():
-        module = cycle.run.system.plan.modules[number]
+def _without_answer(cycle: Cycle) -> Iterator[Finding]:
+    """Positions that are singular or close to it, that do not converge, or in which a load or a sense is undefined."""
+    arrays, dial, causes = cycle.at.arrays, cycle.at.dial, cycle.at.causes
+    status, condition = arrays["status"], np.nan_to_num(arrays["condition"], nan=np.inf)
+    for places, _ in causes.of("stuck").values():
+        if len(places := places[status[places] == Status.ZERO_SLIP]):
+            at = dial.intervals(places)
+            what = f"a joint with friction reverses {at} while its pin moves within its play: friction may act either "
+            yield Finding.note("friction.sense", "joints", f"{what}way there, and the seat changes with it", at=at)
+    for number, (places, _) in causes.of("singular").items():
+        module, at, most = cycle.run.system.plan.modules[number], dial.intervals(places), np.max(condition[places])
         kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
-        what = f"{kind} {cycle.at.dial.intervals(places)}: condition number {_shown(condition[places])}"
+        what = f"{kind} {at}: condition number {readable(most, digits=3)}"
         remedy = "speeds have no finite value there, nor have forces without friction; limit the range of the driver"
-        figures = {"at": cycle.at.dial.intervals(places), "condition": _most(condition[places])}
-        yield Finding.error("position.singular", f"links {', '.join(module.links)}", what, remedy, **figures)
-
-
-def _undefined(cycle: Cycle) -> Iterator[Finding]:
-    """Loads and springs that have no value."""
-    for path, (places, _) in cycle.at.causes.of("undefined").items():
-        at = cycle.at.dial.intervals(places)
-        what = f"has no value {at}"
+        where = f"links {', '.join(module.links)}"
+        yield Finding.error("position.singular", where, what, remedy, at=at, condition=most)
+    for path, (places, _) in causes.of("undefined").items():
+        at = dial.intervals(places)
         if path.startswith("loads."):
             remedy = "extend its tables over the whole cycle, or make them periodic; check divisions and roots"
-            yield Finding.error("load.undefined", path, what, remedy, at=at)
+            yield Finding.error("load.undefined", path, f"has no value {at}", remedy, at=at)
         else:
             remedy = "its line has no direction where its ends coincide: move one end"
-            yield Finding.error("spring.undefined", path, what, remedy, at=at)
+            yield Finding.error("spring.undefined", path, f"has no value {at}", remedy, at=at)
+    if len(late := np.flatnonzero(status == Status.NOT_CONVERGED)):
+        what, at = "the friction iteration did not converge", dial.intervals(late)
+        remedy = "use the Newton method, a larger criterion or more iterations"
+        yield Finding.error("friction.not_converged", "joints", f"{what} {at}", remedy, at=at)
+    if len(close := np.flatnonzero(status == Status.NEAR_SINGULAR)):
+        at, most = dial.intervals(close), np.max(condition[close])
+        what = f"close to a dead centre {at}: condition number up to {readable(most, digits=3)}"
+        remedy = "forces there depend strongly on small changes of the dimensions"
+        yield Finding.warning("position.near_singular", "links", what, remedy, at=at, condition=most)
 
 
 def _locked(cycle: Cycle) -> Iterator[Finding]:
@@ -214,24 +191,16 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
         joints = [name for name in module.joints if name in rubs]
         what = f"locked by friction {where}: there is a solution only up to "
         what += f"{share:.4g} times the friction of {', '.join(joints)}"
-        remedy = (
-            f"lower these coefficients below {share:.3g} times their values, shorten the arms or lengthen the guides"
-        )
-        figures: dict[str, Any] = {"at": where, "share": share, "joints": joints, "whole": margin}
-        figures |= {"reverse": "", "decides": None, "multiple": None}
+        remedy = f"lower the coefficients of all joints below {min(share, margin):.3g} times their values, shorten the "
+        remedy += "arms or lengthen the guides"
         if cycle.locking is not None:
-            states, responsible = cycle.locking.all_states(), cycle.locking.responsible
-            if LockingState.JAMMED in states:
-                also = "locks at some of these positions too" if LockingState.LOCKED in states else "locks there too"
-                what += f"; driven backward it {also} (jammed)"
-                figures["reverse"] = also
-            if responsible and responsible[0] in module.joints and responsible[1] < 1:
-                figures |= {"decides": responsible[0], "multiple": responsible[1]}
-                alone = f"lower the coefficient of {responsible[0]} alone below {responsible[1]:.3g} times its value"
-                remedy = f"{alone}; or {remedy}"
-        if margin < (1 - NEXT) * share:
-            remedy = f"lower the coefficients of all joints below {margin:.3g} times their values (where "
-            remedy += f"{', '.join(joints)} no longer lock, other joints do), shorten the arms or lengthen the guides"
+            if LockingState.JAMMED in (states := cycle.locking.all_states()):
+                also = "at some of these positions" if LockingState.LOCKED in states else "there"
+                what += f"; driven backward it locks {also} too (jammed)"
+            joint, multiple = cycle.locking.responsible or ("", 1.0)
+            if joint in module.joints and multiple < 1:
+                remedy = f"lower the coefficient of {joint} alone below {multiple:.3g} times its value; or {remedy}"
+        figures = {"at": where, "share": share, "joints": joints, "margin": margin}
         yield Finding.error("friction.locked", f"links {', '.join(module.links)}", what, remedy, **figures)
 
 
@@ -256,31 +225,6 @@ def _locks(cycle: Cycle) -> Iterator[tuple[int, str, float, float]]:
             yield number, where, share, margin
 
 
-def _badly_solved(cycle: Cycle) -> Iterator[Finding]:
-    """Positions whose friction does not converge, and such as are close to singular."""
-    status, condition, dial = cycle.at.arrays["status"], cycle.at.arrays["condition"], cycle.at.dial
-    if len(late := np.flatnonzero(status == Status.NOT_CONVERGED)):
-        what = f"the friction iteration did not converge {dial.intervals(late)}"
-        remedy = "use the Newton method, a larger criterion or more iterations"
-        yield Finding.error("friction.not_converged", "joints", what, remedy, at=dial.intervals(late))
-    if len(close := np.flatnonzero(status == Status.NEAR_SINGULAR)):
-        what = f"close to a dead centre {dial.intervals(close)}: condition number up to {_shown(condition[close])}"
-        remedy = "forces there depend strongly on small changes of the dimensions"
-        figures = {"at": dial.intervals(close), "condition": _most(condition[close])}
-        yield Finding.warning("position.near_singular", "links", what, remedy, **figures)
-
-
-def _most(values: Array) -> float:
-    """The largest; ∞ if any has no value."""
-    return float(np.max(values)) if len(values) and np.all(np.isfinite(values)) else np.inf
-
-
-def _shown(values: Array) -> str:
-    """The largest in words."""
-    most = _most(values)
-    return f"{most:.3g}" if np.isfinite(most) else "∞"
-
-
 def _resting(cycle: Cycle) -> Iterator[Finding]:
     """Joints at rest, those that are at the same positions as one, and the interval of the efforts there."""
     system, at, scales = cycle.run.system, cycle.at, scales_of(cycle.run)
@@ -290,30 +234,24 @@ def _resting(cycle: Cycle) -> Iterator[Finding]:
         if joint in holding:
             together.setdefault(places.tobytes(), ([], places))[0].append(joint)
     for joints, places in together.values():
-        widest: dict[str, dict[str, Any]] = {}
+        bounds = list[str]()
         matters = not cycle.mechanism.drivers
         for i, (driver, unit) in enumerate(zip(cycle.mechanism.drivers, effort_units(system), strict=True)):
             lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
             widths, largest = (upper - lower)[places], np.nanmax(np.abs([lower, upper]), initial=0.0)
-            least = max(NEGLIGIBLE * largest, scales.floor(unit))
-            matters |= bool(np.any(np.isnan(widths) | (widths > least)))
+            matters |= bool(np.any(~(widths <= max(NEGLIGIBLE * largest, scales.floor(unit)))))
             if np.any(np.isfinite(widths)):
                 k = places[int(np.nanargmax(widths))]
-                widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {at.dial.at(k)}"}
+                what = "torque" if unit == "N m" else "force"
+                bounds.append(f"{what} of {driver} {between(lower[k], upper[k], unit)} at {at.dial.at(k)}")
         if matters:
-            bounds = ", ".join(
-                f"{'torque' if row['unit'] == 'N m' else 'force'} of {driver} "
-                f"{between(row['from'], row['to'], row['unit'])} {row['at']}"
-                for driver, row in widest.items()
-            )
             if not bounds and cycle.mechanism.drivers:
-                bounds = "with one sign it locks, so the drive effort has no bounds"
+                bounds = ["with one sign it locks, so the drive effort has no bounds"]
             where = at.dial.intervals(places)
-            resting = f"{', '.join(joints)} {agreeing(len(joints), 'is', 'are')} "
-            resting += f"{'' if 'between' in where else 'momentarily '}at rest {where}"
-            what = f"{resting}; friction may act either way there{': ' * bool(bounds)}{bounds}"
+            what = f"{', '.join(joints)} {agreeing(len(joints), 'is', 'are')} at rest {where}; friction may act either "
+            what += ": ".join(filter(None, ["way there", ", ".join(bounds)]))
             remedy = "the bounds are in drive_effort_lower and drive_effort_upper"
-            figures = {"joints": joints, "at": where, "efforts": widest}
+            figures = {"joints": joints, "at": where}
             yield Finding.note("friction.interval", f"joints.{', '.join(joints)}", what, remedy, **figures)
 
 
@@ -321,16 +259,12 @@ def _ranges(cycle: Cycle) -> Iterator[Finding]:
     """Where it can be assembled, if there are several such ranges: extremes are of that which holds the start."""
     ranges = cycle.course.ranges if cycle.course else []
     if len(ranges) > 1:
-        starts = [cycle.between(*ends) for *ends, start in ranges if start]
         places = [cycle.between(*ends) for *ends, _ in ranges]
+        starts = [place for place, (*_, start) in zip(places, ranges, strict=True) if start]
         of = f"extremes are of the one that holds the start, {starts[0]}" if starts else "none of them holds the start"
-        remedy = (
-            "start the driver in another range to have the extremes of that" if starts else "start the driver in one"
-        )
-        what = (
-            f"it can be assembled in {len(places)} ranges that are not reached from each other: {', '.join(places)}; "
-        )
-        yield Finding.note("assembly.ranges", "links", what + of, remedy, ranges=places, starts=starts)
+        what = f"it can be assembled in {len(places)} ranges that are not reached from each other: {', '.join(places)}"
+        remedy = "start the driver in another range to have the extremes of that"
+        yield Finding.note("assembly.ranges", "links", f"{what}; {of}", remedy, ranges=places, starts=starts)
 
 
 def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
@@ -339,8 +273,8 @@ def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
     spans = [run.system.span(run.values, name) for name in drivers]
     several = len(spans) > 1 or cycle.mechanism.gears or run.cycle.advances
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
-        whom = "drivers" if len(spans) > 1 else f"driver and the {'gears' if cycle.mechanism.gears else 'threads'}"
-        what = f"the {whom} have no common period; the cycle is the longest period, {run.cycle.duration:g} s"
+        what = "the drivers, gears and threads have no common period; the cycle is the longest period, "
+        what += f"{run.cycle.duration:g} s"
         remedy = "means and efficiency are over that time; choose speeds with a common period, or ranges"
         yield Finding.warning("cycle.not_common", "drivers", what, remedy, duration=run.cycle.duration)
 
@@ -378,31 +312,28 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
     for row, (name, spring) in enumerate(springs.items()):
         where, elongation = f"springs.{name}", courses.picked(np.array([row]))
         free, preload = (float(np.max(run.values.get(f"{where}.{key}", 0.0))) for key in ("free_length", "preload"))
+        least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
+        if least is None or most is None:
+            continue
         if spring.joint is not None and run.system.turns(spring.joint):
             before, after = elongation.sides(0)
-            jumps = np.flatnonzero(np.abs(after - before) > np.pi)
-            if len(jumps):
-                what = f"its torque jumps at {cycle.place(float(courses.edges[1 + jumps[0]]))}, where its angle "
-                what += "passes half a turn from the free angle"
+            if len(jumps := np.flatnonzero(np.abs(after - before) > np.pi)):
+                at = cycle.place(float(courses.edges[1 + jumps[0]]))
+                what = f"its torque jumps at {at}, where its angle passes half a turn from the free angle"
                 remedy = "whole turns are not counted in this joint"
-                figures = {"at": cycle.place(float(courses.edges[1 + jumps[0]]))}
-                yield Finding.warning("spring.jump", where, what, remedy, **figures)
-        if spring.only is not None:
-            sign = 1.0 if spring.only == "pull" else -1.0
-            most = elongation.extreme(lambda rows: rows[0], sign)
-            if most is not None and sign * most.value < 0:
-                end, nearest = "longest" if spring.only == "pull" else "shortest", free + most.value
-                what = f"never acts: its {end} length is {readable(nearest, 'm')}, its free length "
-                what += f"{readable(free, 'm')}, and it can only {spring.only}"
-                remedy = "move its ends, or change its free length or the motion, if it is to act"
-                yield Finding.warning("spring.never_acts", where, what, remedy, free=free, nearest=nearest)
-        if spring.between is not None and spring.only != "pull" and (free or preload):
-            least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
-            if least is not None and most is not None and least.value + free <= MEETS * (most.value + free):
-                what = f"its ends pass each other at {cycle.place(least.time)}: its length falls to about 0, and its "
-                what += "force reverses"
-                remedy = "move one end along its line, with the free length, so that they stay apart"
-                yield Finding.warning("spring.turned_round", where, what, remedy, at=cycle.place(least.time))
+                yield Finding.warning("spring.jump", where, what, remedy, at=at)
+        if (spring.only == "pull" and most.value < 0) or (spring.only == "push" and least.value > 0):
+            nearest = free + (most if spring.only == "pull" else least).value
+            what = f"never acts: it can only {spring.only}, its free length is {readable(free, 'm')}, and the length "
+            what += f"nearest to that is {readable(nearest, 'm')}"
+            yield Finding.warning("spring.never_acts", where, what, free=free, nearest=nearest)
+        bears = spring.between is not None and spring.only != "pull" and (free or preload)
+        if bears and least.value + free <= MEETS * (most.value + free):
+            what = f"its ends pass each other at {cycle.place(least.time)}: its length falls to about 0, and its "
+            remedy = "move one end along its line, with the free length, so that they stay apart"
+            yield Finding.warning(
+                "spring.turned_round", where, f"{what}force reverses", remedy, at=cycle.place(least.time)
+            )
 
 
 def _slack(cycle: Cycle) -> Iterator[Finding]:
@@ -418,16 +349,9 @@ def _slack(cycle: Cycle) -> Iterator[Finding]:
         if not low < -scales_of(cycle.run).floor("N") or not high > scales_of(cycle.run).floor("N"):
             continue
         places = " and ".join(course.told(top) for top in ends if top is not None)
-        what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; "
+        what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; a rope goes slack where it "
         remedy = "a closed chain or belt bears both ways; a rope needs a load or a speed that keep it taut"
-        yield Finding.note(
-            "gears.slack",
-            f"gears.{name}",
-            f"{what}a rope goes slack where it would push",
-            remedy,
-            lower=low,
-            upper=high,
-        )
+        yield Finding.note("gears.slack", f"gears.{name}", f"{what}would push", remedy, lower=low, upper=high)
 
 
 def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
@@ -518,7 +442,7 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
     if not run.seats:
         return
     seating = seating_of(run, at.method)
-    loads, joints = seating.loads, list(run.system.joints)
+    loads = seating.loads
     yield from _unloaded(cycle, loads)
     lost: dict[tuple[str, str], list[str]] = {}
     lifted: dict[tuple[str, str], list[str]] = {}
@@ -534,45 +458,25 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
             lost.setdefault((part, listed(places)), []).append(joint)
         elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
             what = f"the {part} carries no load: it is at the middle of its play"
-            remedy = "state the seat, or seat: free"
-            yield Finding.note("seat.unloaded", f"joints.{joint}", what, remedy, part=part)
+            yield Finding.note("seat.unloaded", f"joints.{joint}", what, "state the seat, or seat: free", part=part)
         if halts:
             spans = _joined(halts, APART * run.cycle.duration)
             lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
     for (part, text), names in lost.items():
-        nearest = min(
-            (cross for cross in loads.passages if cross.end.seat.joint in names),
-            key=lambda cross: cross.least / cross.peak,
-        )
+        crossings = [cross for cross in loads.passages if cross.end.seat.joint in names]
+        nearest = min(crossings, key=lambda cross: cross.least / cross.peak)
         least = nearest.least if nearest.least > NO_LOAD * nearest.peak else 0.0  # less than that is rounding
-        numbers, number, turning = at.arrays["contact_loss_number"][[joints.index(name) for name in names]], None, ""
-        if part == "pin" and np.any(np.isfinite(numbers)):  # the load of a slider has no direction that can turn
-            number = np.nanmax(numbers)
-            turning = f"at {at.dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
-        several, remedy = len(names) > 1, "expect impact there"
-        what = f"the {part} loses contact {text}: its load falls to {readable(least, 'N')} (peak "
-        what += f"{readable(nearest.peak, 'N')}) and reverses, and the pin would cross its play"
-        if several:
-            what = f"the {part}s lose contact {text}: the loads fall to {readable(least, 'N')} (peak "
-            what += f"{readable(nearest.peak, 'N')}) and reverse, and the pins would cross their play"
-        if number is not None:
-            remedy += (
-                f"; elsewhere {'their largest' if several else 'its'} contact-loss number is at most {number:.3g} "
-            )
-            remedy += f"rad/(N s), {turning} (impact is likely from {contact_loss.EARLES_WU:g}: Earles and Wu)"
-        figures = {
-            "part": part,
-            "count": len(names),
-            "at": text,
-            "least": least,
-            "peak": nearest.peak,
-            "number": number,
-        }
-        yield Finding.warning("contact.lost", f"joints.{', '.join(names)}", what, remedy, **figures)
+        what = f"the {part}{agreeing(len(names), ' loses', 's lose')} contact {text}: the load falls to "
+        what += (
+            f"{readable(least, 'N')} (peak {readable(nearest.peak, 'N')}) and reverses, and the pin would cross its "
+        )
+        what += "play"
+        figures = {"part": part, "count": len(names), "at": text, "least": least, "peak": nearest.peak}
+        where = f"joints.{', '.join(names)}"
+        yield Finding.warning("contact.lost", where, what, "expect impact there", **figures)
     for (part, text), names in lifted.items():
-        what = f"the {part}{agreeing(len(names), '', 's')} {agreeing(len(names), 'lifts', 'lift')} off the wall "
-        what += f"{text}: the inertia force of {agreeing(len(names), 'its', 'their')} motion within the play exceeds "
-        what += "the load"
+        what = f"the {part}{agreeing(len(names), ' lifts', 's lift')} off the wall {text}: the inertia force of the "
+        what += "motion within the play exceeds the load"
         remedy = "forces there are those of a pin that stays in contact"
         figures = {"part": part, "at": text, "count": len(names)}
         yield Finding.warning("contact.lifted", f"joints.{', '.join(names)}", what, remedy, **figures)
@@ -587,8 +491,7 @@ def _unsettled(cycle: Cycle, seating: Seating) -> Iterator[Finding]:
         intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
         change = np.max(at.arrays["seat_change"][unsettled[i]])
         what = f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes by {change:.2g} "
-        what += "times the clearance, for the load turns as the pin moves, as where a tool touches the work for only "
-        what += "one of two positions of a pin"
+        what += "times the clearance, for the load turns as the pin moves"
         remedy = "the pin floats there: treat it as loss of contact"
         figures = {"rounds": SEAT_ROUNDS, "at": intervals, "change": change}
         yield Finding.warning("seat.unsettled", f"joints.{joints[i]}", what, remedy, **figures)
@@ -620,7 +523,6 @@ def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[fl
 
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
-    _of_the_model, _not_assembled, _undecided_senses, _singular, _undefined, _locked, _badly_solved, _resting,
-    _ranges, _no_common_period, _driving_resistances, _springs, _slack, _idle_loads, _beside_gaps,
-    _uncounted_work, _lost_contacts,
+    _not_assembled, _without_answer, _locked, _resting, _ranges, _no_common_period, _driving_resistances, _springs,
+    _slack, _idle_loads, _beside_gaps, _uncounted_work, _lost_contacts,
 )  # fmt: skip

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
-from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures import curves
-from trunnion.measures.angles import within
 from trunnion.measures.evaluation import courses_of
+from trunnion.measures.figures import SIGNS
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
-from trunnion.measures.positions import ends_by_name, plan
+from trunnion.measures.positions import ends_by_name
 from trunnion.results.dataset import MemberUnits, Variable, described
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -37,12 +37,7 @@ VARIABLES = {
         ("measure",), "measure_figure", "figure of the measure over the cycle; NaN of one that states none"
     ),
 }
-SWITCHES = ", where a load begins or ends or a joint reverses, and the pins cross their play"
-# figures of single positions: of one, and of two
-OF_PLACES = (
-    "value", "maximum", "minimum", "peak-to-peak", "place-of-maximum", "place-of-minimum", "time ratio", "largest",
-)  # fmt: skip
-OF_BOTH = ("peak-to-peak", "time ratio")
+BETWEEN = ("largest", "peak-to-peak", "time ratio")  # rules of two extremes
 TAKEN = ("time", "drive", "power_in", "power_useful", "seat_rounds", "status")  # columns of the result
 
 
@@ -50,8 +45,8 @@ TAKEN = ("time", "drive", "power_in", "power_useful", "seat_rounds", "status")  
 class Watched:
     """values: (measure, position), figures: (measure,), SI; findings: which measures of the model are left out, why.
 
-    notes: what a pin that loses contact does to a figure, by the measure's name; extremes: least and largest value over
-    the cycle of one that states no figure, where no pin does.
+    notes: what is to be known of a figure, by the measure's name; extremes: least and largest value over the cycle of
+    one that states no figure. Extremes leave out where a pin loses contact: there its seat would jump.
     """
 
     run: Run
@@ -96,39 +91,19 @@ class Watched:
                 yield Figure(f"{name}.max", subject, most, unit, "maximum")
 
 
-def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None) -> Watched:
-    """The model's measures over the cycle. time: positions of the result, s; status: theirs, if known.
-
-    A figure at a position where a pin loses contact is NaN: it is that of a seat which would jump.
-    """
-    measures, findings, of_cycle, extremes, why = run.once(("measures", method), lambda: _over_cycle(run, method))
+def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:
+    """The model's measures over the cycle. time: positions of the result, s."""
+    measures, figures, findings, notes, extremes = run.once(("measures", method), lambda: _over_cycle(run, method))
     values = _values_at(run, measures, time, method)
-    figures, findings, notes = np.array([of_cycle.get(item.name, np.nan) for item in measures]), [*findings], {**why}
-    lost = np.zeros(len(time), bool) if status is None else status == Status.CONTACT_LOST
-    for i, measure in enumerate(measures if np.any(lost) else ()):
-        if measure.rule == "deviation":
-            continue
-        places = _resting_on(run, measure, values[i], time)
-        gone = places[lost[places]]
-        if len(gone) and measure.rule in OF_PLACES:
-            dial = run.system.dial(run.values, time)
-            at = " and ".join(dial.at(int(k)) for k in gone)
-            figures[i], notes[measure.name] = np.nan, f"not valid: a pin loses contact at its place, {at}"
-            switches = SWITCHES if _beside_switch(run, time, gone) else ""
-            what = f"the measure has no figure: a pin loses contact at its place, {at}{switches}"
-            remedy = "state another place or window of the measure, by at: or over:, or analyse with --seat free"
-            findings.append(Finding.note("measure.contact_lost", f"measures.{measure.name}", what, remedy, at=at))
-        elif len(gone):
-            notes[measure.name] = f"a pin loses contact at {len(gone)} of its {len(places)} positions"
     values[[item.of.reduced for item in measures]] = np.nan  # a number of the whole cycle
     return Watched(run, measures, values, figures, findings, notes, extremes)
 
 
 def _over_cycle(
     run: Run, method: FrictionMethod
-) -> tuple[list[Measure], list[Finding], dict[str, float], dict[str, tuple[float, float]], dict[str, str]]:
-    """The measures that a cycle has, why the others are left out, the figures of those that state one, the extremes of
-    the others where no pin loses contact, and why there is no figure."""
+) -> tuple[list[Measure], Array, list[Finding], dict[str, str], dict[str, tuple[float, float]]]:
+    """The measures that a cycle has and the figures of those that state one; why others are left out, and what is to be
+    known of a figure; the extremes of the others."""
     measures, findings, notes = list[Measure](), list[Finding](), dict[str, str]()
     for name in run.system.mechanism.measures:
         try:
@@ -136,17 +111,27 @@ def _over_cycle(
         except MechanismError as error:
             what = f"the measure '{name}' is left out: {error.findings[0].what}"
             findings.append(Finding(what, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
-    figures = figures_of(run, [item for item in measures if item.rule != "deviation"], method)
     single = [item for item in measures if item.rule == "deviation" and item.single(run.system)]
-    gaps = seating_of(run, method).gaps if run.seats and single else None
+    asked = [item for item in measures if item.rule != "deviation"]
     least, most = (
-        figures_of(run, [replace(item, statistic=statistic) for item in single], method, gaps)
+        figures_of(run, [replace(item, statistic=statistic) for item in single], method)
         for statistic in ("minimum", "maximum")
     )
-    for measure in measures:
-        if np.isfinite(figures.get(measure.name, 0.0)):
-            continue
-        if measure.rule.startswith("dead centre"):
+    figures = figures_of(run, asked, method)
+    gaps = seating_of(run, method).gaps if run.seats and asked else np.zeros((2, 0))
+    for measure in asked:
+        where = f"measures.{measure.name}"
+        if np.isfinite(figures[measure.name]):
+            if np.size(gaps):
+                share = float(np.sum(gaps[1] - gaps[0])) / run.cycle.duration
+                without = "without" if measure.rule in SIGNS or measure.rule in BETWEEN else "a pin loses contact in"
+                notes[measure.name] = f"{without} {share:.2g} of the cycle"
+        elif measure.at is not None and np.size(gaps):
+            notes[measure.name] = "not valid: a pin loses contact at its place"
+            what = "the measure has no figure: a pin loses contact at its place"
+            remedy = "state another place, or analyse with --seat free"
+            findings.append(Finding.note("measure.contact_lost", where, what, remedy))
+        elif measure.rule.startswith("dead centre"):
             ends = "minimum", "maximum: leave out as"
             what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
             notes[measure.name] = f"no {what} within the cycle; for a {other}"
@@ -154,29 +139,8 @@ def _over_cycle(
             notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
         elif measure.formula:
             notes[measure.name] = "it has no value at some positions: check roots and divisions, or state over:"
-    return measures, findings, figures, {name: (least[name], most[name]) for name in least}, notes
-
-
-def _beside_switch(run: Run, time: Array, places: NDArray[np.intp]) -> bool:
-    """Whether the model switches within a step of every one of some positions."""
-    step, around = run.cycle.duration / len(time), run.cycle.duration if run.cycle.periodic else np.inf
-    away = np.abs(time[places, None] - np.array([bend.time for bend in run.bends]))
-    return bool(np.all(np.min(np.minimum(away, around - away), axis=1, initial=np.inf) <= step))
-
-
-def _resting_on(run: Run, measure: Measure, values: Array, time: Array) -> NDArray[np.intp]:
-    """Positions that a figure is of, nearest to it: those of its extremes, or all of its window."""
-    window = plan(run, [measure], len(time)).windows[measure.name]
-    duration, places = run.cycle.duration, within(run, window.time)
-    more = [duration] if run.cycle.periodic and duration > 0 else []  # after the last position the first one again
-    index = np.unique(np.rint(np.interp(places, [*time, *more], range(len(time) + len(more)))).astype(int) % len(time))
-    course = values[index]
-    if measure.rule not in OF_PLACES or not np.any(np.isfinite(course)):
-        return index
-    course = np.abs(course) if measure.rule == "largest" else course
-    least, most = index[np.nanargmin(course)], index[np.nanargmax(course)]
-    ends = [least] if measure.rule.endswith("minimum") else [least, most] if measure.rule in OF_BOTH else [most]
-    return np.array(ends)
+    row = np.array([figures.get(item.name, np.nan) for item in measures])
+    return measures, row, findings, notes, {name: (least[name], most[name]) for name in least}
 
 
 def _of_a_cycle(run: Run, name: str) -> Measure:

@@ -40,7 +40,7 @@ BOOKS = {
 # what makes an angle run on over whole turns
 TURNED = {
     "joint_rotation": ("joint_rotation_velocity", "link_angle", "link_angle_velocity"),
-    "link_angle": ("link_angle_velocity",),
+    "link_angle": ("link_angle_velocity", "joint_rotation", "joint_rotation_velocity"),
 }
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
 
@@ -194,7 +194,7 @@ def _fill(
     """One chunk of positions; of a mechanism with errors beside the ideal one."""
     seating = seating_of(run, method) if run.seats else None
     seated = seating.at(time, method) if seating else None
-    fill_chunk(arrays, seated.back if seated else run.solve(time, method=method), time, window, causes)
+    fill_chunk(arrays, seated.back if seated else run.solve(time, method=method), window, causes)
     if seating and seated:
         causes.keep("stuck", "", seated.sticks, np.arange(window.start, window.stop))
         arrays["seat_rounds"][window], arrays["seat_change"][window] = seated.rounds, seating.change[seated.states]
@@ -203,7 +203,7 @@ def _fill(
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     if run.erring:
         meant = allocate(run.system, len(time), wanted=COMPARED)
-        fill_chunk(meant, run.ideal(time, replace(method, margin_up_to=0.0)), time, slice(0, len(time)))
+        fill_chunk(meant, run.ideal(time, replace(method, margin_up_to=0.0)), slice(None))
         fill_errors(arrays, meant, run.system, window)
 
 

@@ -28,7 +28,7 @@ def _looked(run: Run) -> Mapping[str, NDArray[np.float64]]:
     time = run.cycle.times(LOOKED if run.cycle.duration > 0 else 1)
     arrays = allocate(run.system, len(time))
     with np.errstate(all="ignore"):
-        fill_chunk(arrays, run.solve(time), time, slice(0, len(time)))
+        fill_chunk(arrays, run.solve(time), slice(None))
     return arrays
 
 

@@ -61,7 +61,7 @@ def result_of(run: Run, at: Positions, selection: Kept = ALL) -> Result:
     """
     mechanism, cycle = run.system.mechanism, Cycle(run, at)
     near = cycle.locking if cycle.course else None
-    measured = watched(run, at.time, at.method, at.arrays["status"])
+    measured = watched(run, at.time, at.method)
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
     attributes = encoded(
         {

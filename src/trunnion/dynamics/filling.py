@@ -81,7 +81,7 @@ def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened |
         touched = motion.contacts.pushes(back.walk, onsets)
         touches.fill(lanes, touched, onsets)
         stated_back = back if stated is None else stated.back(back, touched)
-        fill_chunk(arrays, stated_back, at.time, window)
+        fill_chunk(arrays, stated_back, window)
         if stated is not None:
             stated.fill(arrays, stated_back.walk, touched, window)
         resting[lanes] = stretch.resting

@@ -43,7 +43,7 @@ from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run
 
-__all__ = ["Figures", "Panels", "Reading", "combined", "within_limits"]
+__all__ = ["SIGNS", "Figures", "Panels", "Reading", "combined", "within_limits"]
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump

@@ -21,6 +21,7 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
+from trunnion.errors import Status
 from trunnion.measures.angles import angles, near, within
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
 from trunnion.measures.figures import Panels, Reading, combined
@@ -496,12 +497,16 @@ class Group:
         return {name: _joined_reads([read[name] for read in reads]) for name in reads[0]}
 
     def own_figures(self, breaks: Array, accuracy: Accuracy) -> dict[str, float]:
-        """The figures of the nominal mechanism by itself, by name. breaks: times, s, where courses may bend or jump."""
+        """The figures of the nominal mechanism by itself, by name; NaN of a place where a pin loses contact.
+
+        breaks: times, s, where courses may bend or jump.
+        """
         if self.at_place:
             reads = self._on(self.values, self.edges[None], {})[0]
-        else:
-            between = breaks_between(self.run.cycle, breaks, *self.span)
-            reads = self._read_alone(self._courses(self.values, [between], accuracy)[0], {})
+            lost = any(read.status[0] == Status.CONTACT_LOST for read in reads.values())
+            return {name: np.nan if lost else float(np.ravel(read.figure)[0]) for name, read in reads.items()}
+        between = breaks_between(self.run.cycle, breaks, *self.span)
+        reads = self._read_alone(self._courses(self.values, [between], accuracy)[0], {})
         return {name: float(np.ravel(read.figure)[0]) for name, read in reads.items()}
 
     def _read_alone(self, course: Courses, times: Mapping[str, Array]) -> dict[str, Read]:

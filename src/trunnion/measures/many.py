@@ -25,16 +25,14 @@ Array = NDArray[np.float64]
 
 
 @np.errstate(all="ignore")
-def figures_of(
-    run: Run, measures: Sequence[Measure], method: FrictionMethod, gaps: Array | None = None
-) -> dict[str, float]:
+def figures_of(run: Run, measures: Sequence[Measure], method: FrictionMethod) -> dict[str, float]:
     """The figures of measures of one mechanism, SI, by name; NaN where a place that one needs has no answer.
 
-    gaps: times, s, from and to, (2, gap), which extremes leave out.
+    Extremes leave out where a pin loses contact, for its seat would jump there.
     Raises MechanismError for places and windows that are not in the cycle.
     """
     figures: dict[str, float] = {}
-    gaps = np.zeros((2, 0)) if gaps is None else gaps
+    gaps = seating_of(run, method).gaps if run.seats and measures else np.zeros((2, 0))
     for ends, grouped in together(run, measures):
         kernel = SeatedKernel(run, grouped, replace(method, margin_up_to=0.0), gaps)
         group = Group(run, grouped, ends, run.values, kernel, {})

@@ -19,7 +19,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CYCLE", "OF_SOME_JOINTS", "VARIABLES", "allocate", "dataset", "variables"]
+__all__ = ["CYCLE", "OF_SOME_JOINTS", "SAME_AS", "VARIABLES", "dataset", "variables"]
 
 
 def _coordinate(
@@ -190,37 +190,6 @@ def _along_positions(space: str) -> dict[str, Variable]:
 
 def _space(labels: Labels) -> str:
     return "spatial" if "component" in labels else "planar"
-
-
-def allocate(
-    labels: Labels,
-    positions: int,
-    parts: Sequence[str] = (),
-    wanted: Collection[str] | None = None,
-) -> dict[str, NDArray[np.float64]]:
-    """Arrays for every variable, to be filled, position last.
-
-    parts: of those variables that not every result has. wanted: what will be read, all if not given; of the others
-    every entry is one cell, so that filling them costs next to nothing.
-    """
-    arrays: dict[str, NDArray[np.float64]] = {}
-    for name, variable in variables(_space(labels)).items():
-        if name in SAME_AS or not labels.keys() >= set(variable.dims):  # no springs, no spring_force
-            continue
-        if variable.part and variable.part not in parts:
-            continue
-        shape = (*(len(labels[dim]) for dim in variable.dims), positions)
-        if wanted is not None and name not in wanted:
-            cell = np.zeros(1, variable.dtype)
-            arrays[name] = np.lib.stride_tricks.as_strided(cell, shape, (0,) * len(shape))
-        else:
-            # zeroed pages take no memory until something is written: rows of the ground and slides of pins never are
-            arrays[name] = np.zeros(shape, variable.dtype)
-            if variable.part in OF_SOME_JOINTS and variable.dtype is np.float64:
-                arrays[name][:] = np.nan  # of joints and ends that have none
-    for name, other in SAME_AS.items():
-        arrays[name] = arrays[other]
-    return arrays
 
 
 def dataset(

@@ -151,7 +151,7 @@ def plots_table() -> str:
 
 def formats_table() -> str:
     """Every format a result is written in."""
-    from trunnion.results.export import FORMATS
+    from trunnion.results.save import FORMATS
 
     rows = [
         (code(name), f"`pip install 'trunnion[{extra}]'`" if extra else "") for name, (_, _, extra) in FORMATS.items()

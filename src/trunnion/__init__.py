@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from trunnion.errors import MechanismError, Status
     from trunnion.model.mechanism import Mechanism
     from trunnion.model.mechanism import read_mechanism as read
-    from trunnion.results.export import save
+    from trunnion.results.save import save
     from trunnion.solve.friction_method import FrictionMethod
     from trunnion.studies.allocation.allocate import allocate
     from trunnion.studies.assembly import assemble
@@ -47,7 +47,7 @@ _PLACES = {
     "read": ("trunnion.model.mechanism", "read_mechanism"),
     "report": ("trunnion.views.shown", "report"),
     "rig": ("trunnion.rig", ""),
-    "save": ("trunnion.results.export", "save"),
+    "save": ("trunnion.results.save", "save"),
     "simulate": ("trunnion.dynamics.simulate", "simulate"),
     "sweep": ("trunnion.studies.sweep.study", "sweep"),
     "tolerance": ("trunnion.studies.tolerance.study", "tolerance"),

@@ -146,7 +146,6 @@ def test_passages_dwell_and_rates(level: float) -> None:
     found = course(lambda t: np.cos(t), lambda t: (t - 2.0) ** 2)
     place = np.arccos(level)
     assert found.passages(0, level) == pytest.approx([place, TURN - place], abs=1e-8)
-    assert found.within(0, level, np.inf) == pytest.approx(place / np.pi, abs=1e-8)
     assert found.passages(1) == pytest.approx([2.0], abs=1e-6)  # it touches zero
     rates = found.derivative().at(np.array([1.0]))[:, 0]
     assert rates == pytest.approx([-np.sin(1.0), -2.0], abs=1e-7)

@@ -14,7 +14,7 @@ from mechanisms import excavator, model, slider_crank
 from mechanisms_space import draw
 from trunnion import Mechanism
 from trunnion.results.dataset import unit_of, units_along
-from trunnion.results.export import save
+from trunnion.results.save import save
 from trunnion.results.tables import columns
 
 MIXED = {"S": "N", "K": "N m"}

@@ -17,9 +17,9 @@ import trunnion
 from mechanisms import DURANGO, MODELS, analyse, four_bar
 from trunnion import MechanismError
 from trunnion.results import variables as results
-from trunnion.results.export import FORMATS
+from trunnion.results.save import FORMATS
 
-export = sys.modules["trunnion.results.export"]
+export = sys.modules["trunnion.results.save"]
 
 
 @pytest.fixture(scope="module")

@@ -182,7 +182,7 @@ VERBS = {
     [
         (("analyse", "--out", "a.csv", "--out", "a.xyz"), "cannot write a result as '.xyz'"),
         (("analyse", "--out", "a.svg"), "cannot write a result as '.svg'"),
-        (("tolerance", "--out", "a.svg", "--report", "a.txt"), "a report is HTML"),
+        (("tolerance", "--out", "a.svg", "--report", "a.txt"), "a report is not written as"),
         (("tolerance", "--out", "a.contributions.csv"), "there is no table 'contributions'"),
         (("tolerance", "--kind", "pie"), "there is no figure 'pie'"),
     ],

@@ -163,7 +163,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
         (["--parameter", FRICTION, "--kind", "histogram"], "use one of intervals, correlation, residuals"),
         (["--parameter", FRICTION, "--write", MODEL], "is the model itself"),
         (["--parameter", FRICTION, "--write", "x.toml"], "write .yaml or .json"),
-        (["--parameter", FRICTION, "--report", "x.pdf"], "a report is HTML"),
+        (["--parameter", FRICTION, "--report", "x.pdf"], "a report is not written as"),
         (["--parameter", FRICTION, "--guard", "-1"], "guard"),
     ],
 )

@@ -15,7 +15,7 @@ from stand_in_tolerances import CASES, LIMIT, toleranced
 
 import trunnion
 from trunnion.errors import MechanismError
-from trunnion.results.export import save as export
+from trunnion.results.save import save as export
 from trunnion.studies.tolerance.sampled import QUANTILES
 from trunnion.views.allocation import trade_off
 from trunnion.views.common.figures import PALETTE

@@ -275,15 +275,6 @@ class Courses:
         ends: Array = edges[np.flatnonzero(np.diff(below, prepend=False, append=False))]
         return ends.reshape(-1, 2)
 
-    def within(self, row: int, low: float, high: float) -> float:
-        """Share of the time that a row is between two levels."""
-        row_coefficients = self.coefficients[None, :, row]
-        both = [
-            reading.above(row_coefficients, level) if np.isfinite(level) else np.where(level < 0, 2.0, 0.0)
-            for level in (low, high)
-        ]
-        return float(np.sum((both[0] - both[1]) * self.half) / self.span)
-
     def sides(self, row: int) -> tuple[Array, Array]:
         """The values before and after every inner edge; they differ where the row jumps."""
         last, first = self.ends(row)

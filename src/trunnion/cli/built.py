@@ -55,15 +55,13 @@ def play(
     Worst case, share of each joint, standard deviation.
     """
     from trunnion.studies.play import play as run
-    from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.play import tables
 
     check_files(files)
     mechanism = model.read()
     with model.lines():
         result = run(mechanism, measure, steps, at)
-    pictured = whole_peaks(result, uncut)
-    Shown(result, model, files, "measures joints", pictured, tables=tables(result), apart=False).finish()
+    Shown(result, model, files, "measures joints", uncut, tables=tables(result), apart=False).finish()
 
 
 # ---- tolerance -------------------------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from trunnion.cli.options import OPTIONS
 from trunnion.errors import MechanismError
 from trunnion.files import Target, writing
 
-__all__ = ["flags_of", "options_of", "outputs", "verb"]
+__all__ = ["flags_of", "options_of", "outputs", "types_in", "verb"]
 
 Hints = dict[str, Any]  # types by the names of parameters
 IN_PLACE = {"write": "file"}  # may name that input itself; the verb asks for --force then
@@ -117,12 +117,19 @@ def _types(group: type) -> Hints:
 
 def _word(hint: Any) -> str | None:
     """The word of the help for a value of a type; none for a switch."""
-    kinds = [part for part in get_args(hint) if part is not type(None)]
-    if kinds:
-        return _word(kinds[0])
-    if issubclass(hint, Enum):
-        return "|".join(str(member.value) for member in hint)
-    return {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(hint)
+    kind = next(types_in(hint))
+    if issubclass(kind, Enum):
+        return "|".join(str(member.value) for member in kind)
+    return {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(kind)
+
+
+def types_in(hint: Any) -> Iterator[type]:
+    """The types that a type is made of: of `list[str] | None` text and none."""
+    parts = get_args(hint)
+    for part in parts:
+        yield from types_in(part)
+    if not parts:
+        yield hint
 
 
 # ---- what the types of a verb say ----------------------------------------------------------------------------------
@@ -145,11 +152,7 @@ def flags_of(verb: Callable[..., None]) -> dict[str, str]:
 
 def outputs(verb: Callable[..., None]) -> list[str]:
     """The parameters that name files to be written: every option that takes a path. Inputs are arguments or texts."""
-    return [name for name, hint, _, _ in options_of(verb) if _takes_path(hint)]
-
-
-def _takes_path(hint: Any) -> bool:
-    return hint is Path or any(_takes_path(part) for part in get_args(hint))
+    return [name for name, hint, _, _ in options_of(verb) if Path in types_in(hint)]
 
 
 def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:

@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator
 from enum import Enum
 from inspect import Parameter, signature
 from pathlib import Path
-from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any, get_args, get_origin
 
 from trunnion.cli.built import allocate, assemble, play, tolerance
-from trunnion.cli.files import options_of
+from trunnion.cli.files import options_of, types_in
 from trunnion.cli.measured import compare, identify
 from trunnion.cli.motion import design, locking, simulate
 from trunnion.cli.sweep import sweep
@@ -42,7 +41,7 @@ def forms() -> list[dict[str, Any]]:
 def _fields(study: Callable[..., None]) -> Iterator[dict[str, Any]]:
     usual = {name: parameter.default for name, parameter in signature(study).parameters.items()}
     for name, hint, info, flag in options_of(study):
-        types = set(_types(hint))
+        types = set(types_in(hint))
         if name.strip("_") in LEFT_OUT or Path in types:
             continue
         choices = [[str(member.value) for member in part] for part in types if issubclass(part, Enum)]
@@ -55,12 +54,3 @@ def _fields(study: Callable[..., None]) -> Iterator[dict[str, Any]]:
             "several": any(get_origin(part) is list for part in (hint, *get_args(hint))),
             "usual": str(getattr(value, "value", value)),
         }
-
-
-def _types(hint: Any) -> Iterator[type]:
-    """The types that a type is made of."""
-    if get_origin(hint) in (Union, UnionType, list):
-        for part in get_args(hint):
-            yield from _types(part)
-    else:
-        yield hint

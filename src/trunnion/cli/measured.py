@@ -80,7 +80,7 @@ def rig(model: Model, rig_file: Path, out: Path | None = None, format_: str = ""
 )
 def data(mapping: Path, shared: Files, files: list[Path] | None = None) -> None:
     """Read measured files: conditions, channels, scatter, faults."""
-    from trunnion.results.export import save
+    from trunnion.results.save import save
     from trunnion.rig.reading.measurement import dataset
     from trunnion.rig.reading.read import read_measured
     from trunnion.views.measured import tables

@@ -150,14 +150,9 @@ def _bound(stated: int | None) -> socket.socket:
     or at any if that is taken. MechanismError if it cannot be had."""
     reason = ""
     for port in [USUAL, 0] if stated is None else [stated]:
-        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            listener.bind(("127.0.0.1", port))
-            listener.listen(128)  # a browser that comes before the server runs waits instead of being refused
-            return listener
+        try:  # a browser that comes before the server runs waits in the backlog instead of being refused
+            return socket.create_server(("127.0.0.1", port), backlog=128)
         except (OSError, OverflowError) as error:
-            listener.close()
             reason = getattr(error, "strerror", None) or str(error)
     raise MechanismError(Finding(f"port {stated} cannot be had: {reason}", "--port", "choose another, or 0"))
 

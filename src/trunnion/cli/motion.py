@@ -7,7 +7,7 @@ from typer import Exit
 
 from trunnion.cli.files import verb
 from trunnion.cli.options import DATA, IMAGES, ONE_POSITION, PLOT_KINDS, Files, Friction, Model, seconds
-from trunnion.cli.result import Shown, check_files, check_page, end, exit_status, write_text
+from trunnion.cli.result import PAGES, Shown, check_files, check_target, end, exit_status, write_text
 from trunnion.cli.terminal import bar, line, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import folder
@@ -50,11 +50,9 @@ def analyse(
             rows.append([name, text, "" if output == "1" else output])
         show_rows(f"{result.attrs['name'] or model.file} at {at}", ["", "value", "unit"], rows)
 
-    output = Shown(result, model, files, "assembly", show=show_position if at else None)
+    output = Shown(result, model, files, "assembly", uncut, show=show_position if at else None)
     if files.report is not None:
-        from trunnion.views.common.peaks import whole_peaks
-
-        output.pictured, output.paged = whole_peaks(result.dataset, uncut), {"ideal": _ideal(mechanism, steps)}
+        output.paged = {"ideal": _ideal(mechanism, steps)}
     output.finish()
 
 
@@ -113,7 +111,7 @@ def report(model: Model, out: Path, settled: Friction, steps: int = 360, uncut: 
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.shown import report_of
 
-    check_page(out, "--out")
+    check_target(out, "--out", "a report", PAGES)
     mechanism = model.read()
     with model.lines():
         result = _analysed(mechanism, steps, settled.checked())

@@ -224,16 +224,12 @@ def over(texts: list[str]) -> dict[str, Any]:
             raise MechanismError(Finding(f"'{text}' {what}", "--over", remedy))
         if name in grid:
             raise MechanismError(Finding(f"'{name}' is given twice", "--over", "give all its values at once"))
-        grid[name] = _range(name, parts) if len(parts) == 3 else [_plain(value) for value in values.split(",")]
+        if len(parts) == 3 and not parts[2].strip().isdecimal():
+            what = f"the count '{parts[2].strip()}' is no whole number"
+            raise MechanismError(Finding(what, f"--over {name}", "write FROM:TO:COUNT, e.g. 0deg:30deg:7"))
+        ends = [_plain(part) for part in (parts[:2] if len(parts) == 3 else values.split(","))]
+        grid[name] = (*ends, int(parts[2])) if len(parts) == 3 else ends
     return grid
-
-
-def _range(name: str, parts: list[str]) -> tuple[float | str, float | str, int]:
-    try:
-        return _plain(parts[0]), _plain(parts[1]), int(parts[2])
-    except ValueError:
-        what = f"the count '{parts[2].strip()}' is no whole number"
-        raise MechanismError(Finding(what, f"--over {name}", "write FROM:TO:COUNT, e.g. 0deg:30deg:7")) from None
 
 
 def points(grid: Mapping[str, Any]) -> int:

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["YAML", "Shown", "check_files", "check_model", "check_page", "check_target", "end", "exit_status",
-           "show_tables", "write_text"]  # fmt: skip
+__all__ = ["PAGES", "YAML", "Shown", "check_files", "check_model", "check_target", "end", "exit_status", "show_tables",
+           "write_text"]  # fmt: skip
 
-PAGES = (".html", ".htm")
+PAGES = (".html", ".htm")  # a report is HTML
 YAML, MODELS = (".yaml", ".yml"), (".yaml", ".yml", ".json")
 
 
@@ -44,24 +44,18 @@ def check_files(files: Files, of: str = "", kind: str | None = None, drawn: bool
             what = f"cannot write a result as '{path.suffix.lower()}'"
             raise MechanismError(Finding(what, "--out", f"figures: {instead} --out {path}"))
         if path.suffix.lower() not in others:
-            from trunnion.results.export import check_format  # with xarray, which only a file needs
+            from trunnion.results.save import check_format  # with xarray, which only a file needs
             from trunnion.results.tables import check_table
 
             check_format(path, others)
             if of:
                 check_table(path, of)
-    check_page(files.report, "--report")
+    if files.report is not None:
+        check_target(files.report, "--report", "a report", PAGES)
     if kind is not None:
         from trunnion.views.shown import check_kind
 
         check_kind(of, kind)
-
-
-def check_page(path: Path | None, option: str) -> None:
-    """MechanismError for a report that is no HTML."""
-    if path is not None and path.suffix.lower() not in PAGES:
-        what = f"a report is HTML, '{path.name}' is not"
-        raise MechanismError(Finding(what, option, "write a .html file and print it"))
 
 
 def check_target(path: Path, option: str, what: str, kinds: Sequence[str], over: bool = True) -> None:
@@ -103,20 +97,19 @@ def end(findings: Sequence[Finding], file: Path, sections: str = "", every: bool
 class Shown:
     """A result and what is done with it.
 
-    sections: of the model, whose lines findings get. pictured: what figures and report are made of, the result if not
-    given; drawn, paged: options of figure and report, as the view has them; draw: another figure, by the path of its
-    file. tables: what is printed, `most` rows of each, the file `rest` has the others; the summary if there are none.
-    show: prints something else. others: findings beside those of the result, which are said as they are.
+    sections: of the model, whose lines findings get. uncut: whether pictures show peaks in full; drawn, paged: options
+    of figure and report, as the view has them. tables: what is printed, `most` rows of each, the file `rest` has the
+    others; the summary if there are none. show: prints something else. others: findings beside those of the result,
+    which are said as they are.
     """
 
     result: xr.Dataset | Result
     model: Model
     files: Files
     sections: str
-    pictured: xr.Dataset | None = None
+    uncut: bool = False
     drawn: Mapping[str, Any] = field(default_factory=dict)
     paged: Mapping[str, Any] = field(default_factory=dict)
-    draw: Callable[[Path], Any] | None = None
     tables: Sequence[Any] = ()
     most: int = 0
     rest: str = ""
@@ -131,6 +124,13 @@ class Shown:
         return self.result.dataset if isinstance(self.result, Result) else self.result
 
     @property
+    def pictured(self) -> xr.Dataset:
+        """The result as pictures show it."""
+        from trunnion.views.common.peaks import whole_peaks
+
+        return whole_peaks(self.dataset, self.uncut)
+
+    @property
     def name(self) -> str:
         """Whose result it is."""
         return str(self.result.attrs["name"] or self.model.file)
@@ -143,18 +143,16 @@ class Shown:
                 from trunnion.views.cycle.plots import save as save_figure
                 from trunnion.views.shown import figure_of
 
-                of = self.dataset if self.pictured is None else self.pictured
-                save_figure(self.draw(path) if self.draw else figure_of(of, **self.drawn), path)
+                save_figure(figure_of(self.pictured, **self.drawn), path)
             else:
-                from trunnion.results.export import save
+                from trunnion.results.save import save
 
                 save(self.dataset, path, files.units_row, files.columns, files.units)  # type: ignore[arg-type]  # it checks them
             self.written.append(path)
         if files.report is not None:
             from trunnion.views.shown import report_of
 
-            of = self.dataset if self.pictured is None else self.pictured
-            write_text(report_of(of, **self.paged), files.report)
+            write_text(report_of(self.pictured, **self.paged), files.report)
             self.written.append(files.report)
 
     def write_model(self, mechanism: Mechanism, path: Path, over: bool) -> None:

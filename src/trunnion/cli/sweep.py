@@ -1,8 +1,5 @@
 """`trunnion sweep`: figures of the cycle over a grid of numbers of the model, as tables, files, curves and maps."""
 
-from pathlib import Path
-from typing import Any
-
 from trunnion.cli.files import verb
 from trunnion.cli.options import IMAGES, Files, Model, over, points
 from trunnion.cli.result import Shown, check_files, show_tables
@@ -31,9 +28,8 @@ def sweep(
     """
     from trunnion.studies.sweep.study import sweep as run
     from trunnion.views.charts import check_kind
-    from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.scales import KINDS, check_axes, check_measure
-    from trunnion.views.sweep import figure, tables
+    from trunnion.views.sweep import tables
 
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
@@ -54,10 +50,6 @@ def sweep(
             mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures,
             measures=measures_read, engine=engine,  # type: ignore[arg-type]  # it checks it
         )  # fmt: skip
-    pictured = whole_peaks(result, uncut)
-
-    def draw(path: Path) -> Any:
-        return figure(pictured, measures[0], x, family, kind)
 
     def show() -> None:
         parts = tables(result, measures, x, family, console().width)
@@ -66,5 +58,6 @@ def sweep(
         if left_out:
             line(f"{counted(left_out, 'point')} more; --out FILE.csv has all")
 
-    paged = {"measures": measures, "x": x, "family": family, "kind": kind}
-    Shown(result, model, files, "assembly", pictured, paged=paged, draw=draw, show=show).finish()
+    options = {"x": x, "family": family, "kind": kind}
+    drawn, paged = {"measure": measures[0], **options}, {"measures": measures, **options}
+    Shown(result, model, files, "assembly", uncut, drawn, paged, show=show).finish()

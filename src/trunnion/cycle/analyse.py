@@ -65,7 +65,7 @@ def analyse(
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
     unknown, the engine cannot do the mechanism, or there is no file for what is said of tables.
     """
-    from trunnion.results.export import check_format, save
+    from trunnion.results.save import check_format, save
 
     selection = Kept.read(variables, dtype)
     paths = [out] if isinstance(out, (str, os.PathLike)) else out

@@ -193,14 +193,18 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
         what += f"{share:.4g} times the friction of {', '.join(joints)}"
         remedy = f"lower the coefficients of all joints below {min(share, margin):.3g} times their values, shorten the "
         remedy += "arms or lengthen the guides"
+        decides, multiple = "", 1.0
         if cycle.locking is not None:
             if LockingState.JAMMED in (states := cycle.locking.all_states()):
                 also = "at some of these positions" if LockingState.LOCKED in states else "there"
                 what += f"; driven backward it locks {also} too (jammed)"
-            joint, multiple = cycle.locking.responsible or ("", 1.0)
-            if joint in module.joints and multiple < 1:
-                remedy = f"lower the coefficient of {joint} alone below {multiple:.3g} times its value; or {remedy}"
-        figures = {"at": where, "share": share, "joints": joints, "margin": margin}
+            decides, multiple = cycle.locking.responsible or (decides, multiple)
+        if decides not in module.joints or multiple >= 1:
+            decides = ""
+        if decides:
+            remedy = f"lower the coefficient of {decides} alone below {multiple:.3g} times its value; or {remedy}"
+        figures = {"at": where, "share": share, "joints": joints, "whole": margin, "decides": decides}
+        figures["multiple"] = multiple if decides else None
         yield Finding.error("friction.locked", f"links {', '.join(module.links)}", what, remedy, **figures)
 
 

@@ -32,7 +32,7 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.friction import FrictionProblem, frictionless, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.friction_problem import largest
-from trunnion.solve.loads import has_useful_work, useful_loads, useful_powers, useful_springs
+from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS
@@ -136,10 +136,10 @@ def passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
     Of one that goes `backward` speeds are turned round, friction and all that resists with them; inertia stays, for
     accelerations do.
     """
-    return Passage.of(_back(run, walk, method))
+    return Passage.of(solved_along(run, walk, method))
 
 
-def _back(run: Run, walk: Forward, method: FrictionMethod) -> Backward:
+def solved_along(run: Run, walk: Forward, method: FrictionMethod) -> Backward:
     """Forces at positions of a walk, in its direction."""
     turned, time = walk.direction < 0, np.asarray(walk.time, float)
     past = histories(run.system, run.values, run.chosen.assembly, run.cycle, turned)
@@ -241,7 +241,7 @@ def holding_multiples(run: Run, time: Array) -> Array:
     multiples, least = np.full(len(time), np.nan), scales_of(run).floor("W")
     walk = run.walk(time)
     for direction in (walk, walk.backward()):
-        back = _back(run, direction, FrictionMethod())
+        back = solved_along(run, direction, FrictionMethod())
         full = Passage.of(back)
         holding = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
         if not len(holding):
@@ -391,7 +391,8 @@ class LockingCourse:
         if LockingState.UNSOLVED in self.all_states() or not np.isfinite(delivered + useful):
             return Figure(name, subject, None, note="not every position is solved")
         if others > max(np.sum(error[:2]), LITTLE * useful):
-            return Figure(name, subject, None, note=_beside(run))
+            note = "masses, springs or loads that are not useful supply work too"
+            return Figure(name, subject, None, note=note)
         pushes = self.all_states() & PUSHES
         value = min(float(delivered / useful), 1.0)
         note = "the mean; see the ranges of `locking`" * bool(len(pushes) > 1 and felt(run.system, run.values))
@@ -606,19 +607,6 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
 def centred(run: Run, after: str = "") -> str:
     """What ranges and the way back are of: of the mechanism without play."""
     return (", pins centred" + after) * bool(run.seats)
-
-
-def _beside(run: Run) -> str:
-    """What supplies work beside the useful loads."""
-    mechanism = run.system.mechanism
-    loads, springs = useful_loads(mechanism), useful_springs(mechanism)
-    sources = {
-        "masses": any(link.mass.source != 0 and not link.useful for link in mechanism.effective_links.values()),
-        "springs": any(name not in springs for name in mechanism.springs),
-        "loads that are not useful": any(name not in loads for name in mechanism.loads),
-    }
-    others = [source for source, supplies in sources.items() if supplies]
-    return f"{', '.join(others)} supply work too" if others else "more than 1: not solved accurately enough"
 
 
 def _on_dial(run: Run, times: Sequence[float]) -> tuple[list[float], list[str]]:

@@ -43,7 +43,7 @@ from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run
 
-__all__ = ["SIGNS", "Figures", "Panels", "Reading", "combined", "within_limits"]
+__all__ = ["SIGNS", "Panels", "Read", "Reading", "combined", "within_limits"]
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
@@ -161,26 +161,34 @@ def length(rows: Any) -> Number:
     return namespace(square).sqrt(square)
 
 
-class Figures(NamedTuple):
+class Read(NamedTuple):
     """What is read of the courses of a measure, (lane,) each.
 
-    least, most: signed deviations from the nominal mechanism: of the figure, which is both, or over the courses where
-    the figure is a largest |deviation|; time: of an extreme, s, at a break on the side that has it, NaN of other
-    figures and of what is constant.
+    figure; least, most: signed deviations from the nominal mechanism: of the figure, which is both, or over the courses
+    where the figure is a largest |deviation|; shown: one number at the times asked for, (lane, time), none where the
+    edges have derivatives; time: of an extreme, s, at a break on the side that has it, NaN of other figures, of what is
+    constant and of what is judged against the nominal mechanism; status: the gravest of their places.
     """
 
     figure: Number
     least: Number
     most: Number
+    shown: Number
     time: Array
+    status: NDArray[np.int8]
+
+    @classmethod
+    def of(cls, function: Callable[..., Array], *reads: Read) -> Read:
+        """A linear function of arrays of some reads, for each of their parts."""
+        return cls(*(combined(function, *parts) for parts in zip(*reads, strict=True)))
 
 
 @dataclass(frozen=True)
 class Reading:
     """How the figure of a measure is read of its courses.
 
-    ends: times, s, of the window; none of a whole cycle. nominal: the figure of the nominal mechanism, near which
-    places lie; NaN of none.
+    ends: times, s, of the place or of the window; none of a whole cycle. nominal: the figure of the nominal mechanism,
+    near which places lie; NaN of none.
     """
 
     run: Run
@@ -189,8 +197,8 @@ class Reading:
     nominal: float = float("nan")
 
     @np.errstate(all="ignore")
-    def read(self, panels: Panels) -> Figures:
-        """The figure, SI, and its deviations; NaN where a part of the courses has no answer."""
+    def read(self, panels: Panels, status: NDArray[np.int8], times: Array | None = None) -> Read:
+        """The figure, SI, and its deviations; NaN where a part of the courses has no answer. times: to be shown, s."""
         gone = np.any(np.isnan(primal(panels.coefficients)[..., 0]), axis=0)
         lost = np.any(gone, axis=1)
         figure, least, most, time = self._of_rule(panels)
@@ -199,7 +207,14 @@ class Reading:
             moving = np.isfinite(primal(figure)) | (primal(figure) != self.nominal)
             least = most = selected(moving, figure - self.nominal, 0.0)
         figure, least, most = (selected(~lost, number, np.nan) for number in (figure, least, most))
-        return Figures(figure, least, most, np.where(np.isfinite(primal(figure)), time, np.nan))
+        shown: Number = np.zeros((len(status), 0))
+        if len(self.ends) == 1:
+            shown = np.asarray(primal(figure))[:, None]
+        elif times is not None and not isinstance(panels.low, Dual):
+            shape = len(status), len(times)
+            shown = linear(self.shown(panels, times), lambda array: np.broadcast_to(array, shape))
+        placed = np.isfinite(primal(figure)) & (not self.measure.against_nominal(self.run.system))
+        return Read(figure, least, most, shown, np.where(placed, time, np.nan), status)
 
     def offending(self, panels: Panels, excess: Array) -> NDArray[np.bool_]:
         """Panels that do not resolve the courses as far as the figure needs it, (lane, panel): of an extreme those that
@@ -271,7 +286,7 @@ class Reading:
                 square = panels.mean(lambda rows: of(rows) * of(rows))
                 return namespace(square).sqrt(square)
             case "work":
-                share = (self.ends[1] - self.ends[0]) / self.run.cycle.duration if self.ends else 1.0
+                share = (self._window[1] - self._window[0]) / self.run.cycle.duration if self._window else 1.0
                 return panels.mean(first) * panels.mean(lambda rows: rows[1]) * share
             case "ratio":
                 return self._ratio(panels)
@@ -321,9 +336,14 @@ class Reading:
         return within / full
 
     @property
+    def _window(self) -> tuple[float, ...]:
+        """Both ends, s; none of a whole cycle or a place."""
+        return self.ends if len(self.ends) == 2 else ()
+
+    @property
     def _around(self) -> bool:
         """Whether it comes again."""
-        return self.run.cycle.periodic and not self.ends
+        return self.run.cycle.periodic and not self._window
 
     @property
     def _gain(self) -> float:
@@ -337,7 +357,7 @@ class Reading:
             return path_of(self.run, time)
         laps = np.floor(primal(time) / duration + 1e-12)
         within = time - laps * duration
-        return path_of(self.run, within) + (laps if self.ends else 0.0) * gain_of(self.run)
+        return path_of(self.run, within) + (laps if self._window else 0.0) * gain_of(self.run)
 
     def _dead_centre(self, panels: Panels, time: Number) -> Number:
         """The coordinate of an extreme; NaN at an end of the range, where the motion does not turn back."""
@@ -345,7 +365,7 @@ class Reading:
         around = np.full(len(real), self._around)
         if self.measure.turning(self.run.system):
             around &= np.abs(real[:, -1] @ ENDS[:, 1] - real[:, 0] @ ENDS[:, 0]) <= np.pi
-        start, end = self.ends or (0.0, self.run.cycle.duration)
+        start, end = self._window or (0.0, self.run.cycle.duration)
         place = np.asarray(primal(time))
         at_end = np.minimum(np.abs(place - start), np.abs(place - end)) <= NARROW * (end - start)
         return selected(around | ~at_end, self._coordinate(time), np.nan)

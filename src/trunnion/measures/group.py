@@ -9,10 +9,10 @@ break that of its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.errors import Status
 from trunnion.measures.angles import angles, near, within
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
-from trunnion.measures.figures import Panels, Reading, combined
+from trunnion.measures.figures import Panels, Read, Reading, combined
 from trunnion.measures.lines import turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import moved
@@ -44,7 +44,7 @@ from trunnion.solve.switches import (
 )
 from trunnion.solve.system import Values
 
-__all__ = ["MOTION", "Group", "Read", "matters"]
+__all__ = ["MOTION", "Group", "matters"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -67,27 +67,6 @@ CLOSE, LOCATED = 1e-9, 3e-10  # of the cycle: times that are one, and bends but 
 LOOKED = np.linspace(-1.0, 1.0, 25)
 LOOKED[[0, -1]] *= 1 - 1e-6
 SHORT = 1e-2  # of the step of a difference: what moves bends is smooth
-
-
-class Read(NamedTuple):
-    """What is read of the courses of a measure, (lane,) each.
-
-    figure; least, most: its signed deviations from the nominal mechanism, over the courses of a largest |deviation|;
-    shown: one number at the times asked for, (lane, time), none where the edges have derivatives; time: of an extreme,
-    s, else NaN; status: the gravest of their places.
-    """
-
-    figure: Number
-    least: Number
-    most: Number
-    shown: Number
-    time: Array
-    status: NDArray[np.int8]
-
-    @classmethod
-    def of(cls, function: Callable[..., Array], *reads: Read) -> Read:
-        """A linear function of arrays of some reads, for each of their parts."""
-        return cls(*(combined(function, *parts) for parts in zip(*reads, strict=True)))
 
 
 def matters(bend: Bend, measures: Sequence[Measure]) -> bool:
@@ -331,7 +310,8 @@ class Group:
         count, panels = lanes_of(values), np.shape(primal(edges))[1] - 1
         reads: dict[str, list[Read]] = {measure.name: [] for measure in self.measures}
         offending, gone = np.zeros((count, panels), bool), np.zeros(count, bool)
-        for block in _blocks(count, max(1, self.kernel.at_once // (len(POINTS) * max(1, panels)))):
+        at_once = self.kernel.at_once // (len(POINTS) * max(1, panels))
+        for block in _blocks(count, min(max(1, at_once), READ)):
             block_values = picked(values, block) if count > len(block) else values
             block_edges = _taken(edges, block)
             low = linear(block_edges, lambda array: array[:, :-1])
@@ -342,18 +322,16 @@ class Group:
             if moved_times is not None and not self.at_place:  # how much time of each mechanism the Gauss nodes count
                 weights = linear(moved_times, lambda array: array @ FIT.T @ RATE @ ON_GAUSS)
             for measure in self.measures:
-                every = self._rows(measure, parts, nominal, time)
-                for lanes in _blocks(len(status), READ):
-                    rows = linear(every, lambda array, lanes=lanes: array[:, lanes[0] : lanes[-1] + 1])  # type: ignore[misc]
-                    if self.at_place:
-                        read = Panels.constant(linear(rows, lambda array: array[..., 0, 0]))
-                    else:
-                        start, width, weight = (_taken(part, lanes) for part in (low, half, weights))
-                        none = np.zeros((len(lanes), panels), bool)
-                        read = Panels(start, width, linear(rows, lambda array: array @ FIT.T), weight, none)
-                        offending[block[lanes]] |= self._offending(measure, read, primal(rows), share)
-                    gone[block[lanes]] |= np.any(np.isnan(primal(rows)), axis=(0, 2, 3))
-                    reads[measure.name].append(self._read(measure, read, np.max(status[lanes], axis=(1, 2)), times))
+                rows = self._rows(measure, parts, nominal, time)
+                if self.at_place:
+                    courses = Panels.constant(linear(rows, lambda array: array[..., 0, 0]))
+                else:
+                    none = np.zeros((len(block), panels), bool)
+                    courses = Panels(low, half, linear(rows, lambda array: array @ FIT.T), weights, none)
+                    offending[block] |= self._offending(measure, courses, primal(rows), share)
+                gone[block] |= np.any(np.isnan(primal(rows)), axis=(0, 2, 3))
+                reading = self._reading(measure)
+                reads[measure.name].append(reading.read(courses, np.max(status, axis=(1, 2)), times.get(measure.name)))
         return {name: _joined_reads(parts) for name, parts in reads.items()}, offending, gone
 
     def _evaluated(
@@ -441,18 +419,7 @@ class Group:
         return np.asarray(offending)
 
     def _reading(self, measure: Measure) -> Reading:
-        return Reading(self.run, measure, self.ends[: 2 * (len(self.ends) > 1)], self.figures.get(measure.name, np.nan))
-
-    def _read(self, measure: Measure, panels: Panels, status: NDArray[np.int8], times: Mapping[str, Array]) -> Read:
-        reading, time = self._reading(measure), times.get(measure.name)
-        figure, least, most, top = reading.read(panels)
-        places: Number = np.zeros((len(status), 0))
-        if self.at_place:
-            places = np.asarray(primal(figure))[:, None]
-        elif time is not None and not isinstance(panels.low, Dual):
-            places = linear(reading.shown(panels, time), lambda array: np.broadcast_to(array, (len(status), len(time))))
-        top = np.full(len(status), np.nan) if measure in self.against else top
-        return Read(figure, least, most, places, top, status)
+        return Reading(self.run, measure, self.ends, self.figures.get(measure.name, np.nan))
 
     # ---- mechanisms by themselves -------------------------------------------------------------------------
 
@@ -515,7 +482,7 @@ class Group:
         for measure in self.measures:
             count = 1 if measure.of_attitude(self.run.system) else self._counts[measure.name]
             panels = Panels.of(course, slice(row, row := row + count))
-            reads[measure.name] = self._read(measure, panels, status, times)
+            reads[measure.name] = self._reading(measure).read(panels, status, times.get(measure.name))
         return reads
 
     def _courses(

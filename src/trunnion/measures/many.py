@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy
 from trunnion.measures.evaluation import Kernel, SeatedKernel
-from trunnion.measures.group import MOTION, Group, Read, matters
+from trunnion.measures.figures import Read
+from trunnion.measures.group import MOTION, Group, matters
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import ends_by_name
 from trunnion.solve.friction_method import FrictionMethod

@@ -18,20 +18,9 @@ if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
 __all__ = [
-    "KEPT",
-    "Described",
-    "attribute",
-    "cited",
-    "codes",
-    "encoded",
-    "figure_rows",
-    "finding_rows",
-    "findings_of",
-    "origin",
-    "summary_of",
-    "units_of",
-    "whole",
-]
+    "KEPT", "Described", "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of",
+    "origin", "summary_of", "units_of", "whole",
+]  # fmt: skip
 
 _AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
 KEPT = "variables"  # the attribute of a result that has not kept every variable

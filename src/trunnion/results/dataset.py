@@ -16,19 +16,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "TIME",
-    "UNITS_OF_EACH",
-    "Column",
-    "MemberUnits",
-    "Variable",
-    "dataset_of",
-    "described",
-    "driven",
-    "flat",
-    "unit_of",
-    "units_along",
-    "with_variables",
-]
+    "TIME", "UNITS_OF_EACH", "Column", "MemberUnits", "Variable", "dataset_of", "described", "driven", "flat",
+    "unit_of", "units_along", "with_variables",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

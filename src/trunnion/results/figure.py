@@ -61,6 +61,6 @@ class Figure:
 
     @classmethod
     def read(cls, row: Mapping[str, Any]) -> Figure:
-        """The figure of a row; of a file by an older version it is all subject."""
-        parts = {key: str(row.get(key) or "") for key in ("name", "aspect", "place", "note")}
-        return cls(subject=str(row.get("subject") or row["label"]), value=row["value"], unit=row["unit"], **parts)
+        """The figure of a row."""
+        texts = {key: str(row.get(key, "")) for key in ("name", "subject", "aspect", "place", "note")}
+        return cls(value=row["value"], unit=row["unit"], **texts)

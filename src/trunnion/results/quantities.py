@@ -11,23 +11,8 @@ from collections.abc import Iterable
 from trunnion.model.screen import in_use
 
 __all__ = [
-    "Units",
-    "between",
-    "common",
-    "decimals",
-    "decimals_of",
-    "drawn_in",
-    "joined",
-    "number",
-    "parts",
-    "prefixed",
-    "quantity",
-    "read_in",
-    "readable",
-    "scale_of",
-    "scaled",
-    "signed",
-    "with_uncertainty",
+    "Units", "between", "common", "decimals", "decimals_of", "drawn_in", "joined", "number", "parts", "prefixed",
+    "quantity", "read_in", "readable", "scale_of", "scaled", "signed", "with_uncertainty",
 ]  # fmt: skip
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}

@@ -427,7 +427,7 @@ def _compare(question: Asked) -> dict[str, Any]:
 
 def _export(question: Asked) -> dict[str, Any]:
     """A file of the solved cycle, its table, report or a picture of the position `index`: name, type and bytes."""
-    from trunnion.results.export import frame
+    from trunnion.results.save import frame
     from trunnion.views.cycle.plots import mechanism
     from trunnion.views.cycle.report import report
 

@@ -126,7 +126,7 @@ def _xlsx(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> 
 
     Raises MechanismError for a table that does not fit a sheet.
     """
-    from xlsxwriter import Workbook
+    import pandas as pd
 
     tables = {name: columns(result, name) for name in KINDS[kind_of(result)]}
     for name, table in tables.items():
@@ -136,25 +136,21 @@ def _xlsx(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> 
             remedy = "write .csv or .parquet, or fewer steps or columns"
             raise MechanismError(Finding(what, f"{path.name}: {name}", remedy))
     made = BytesIO()  # written by Python: where the disk is full, the package raises what is no OSError
-    book = Workbook(made, {**PLAIN, "in_memory": True})
-    title = str(result.attrs.get("name", ""))
-    book.set_properties({"title": title, "comments": "written by Trunnion", "created": datetime(2000, 1, 1)})
-    head = book.add_format({"bold": True, "bottom": 1})
-    below = book.add_format({"italic": True, "font_color": "#5a636e"})
-    for name, table in tables.items():
-        sheet = book.add_worksheet(name[:NAME])
-        sheet.freeze_panes(HEADS, 1)
-        for place, (label, unit, values) in enumerate(table):
-            sheet.write_string(0, place, label, head)
-            sheet.write_string(1, place, unit, below)
-            sheet.set_column(place, place, max(10, min(len(label) + 2, 40)))
-            numbers = np.asarray(values).dtype.kind in "fiub"
-            for row, value in enumerate(np.asarray(values).tolist(), HEADS):
-                if not numbers:
-                    sheet.write_string(row, place, str(value))
-                elif np.isfinite(value):  # numbers that are none are empty cells
-                    sheet.write_number(row, place, value)
-    book.close()
+    with pd.ExcelWriter(made, "xlsxwriter", engine_kwargs={"options": {**PLAIN, "in_memory": True}}) as writer:
+        book = writer.book
+        title = str(result.attrs.get("name", ""))
+        book.set_properties({"title": title, "comments": "written by Trunnion", "created": datetime(2000, 1, 1)})
+        head = book.add_format({"bold": True, "bottom": 1})
+        below = book.add_format({"italic": True, "font_color": "#5a636e"})
+        for name, table in tables.items():
+            rows = _frame(table).replace([np.inf, -np.inf], np.nan)  # numbers that are none are empty cells
+            rows.to_excel(writer, sheet_name=name[:NAME], startrow=HEADS, header=False, index=False)
+            sheet = writer.sheets[name[:NAME]]
+            sheet.freeze_panes(HEADS, 1)
+            for place, (label, unit, _) in enumerate(table):
+                sheet.write_string(0, place, label, head)
+                sheet.write_string(1, place, unit, below)
+                sheet.set_column(place, place, max(10, min(len(label) + 2, 40)))
     path.write_bytes(made.getbuffer())
 
 

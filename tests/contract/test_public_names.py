@@ -121,6 +121,10 @@ WRONG: dict[str, tuple[Callable[[trunnion.Mechanism], Any], type[Exception], str
     "degrees without a unit": (
         lambda m: trunnion.tolerance(m, at=60), trunnion.MechanismError, "at: is 60 rad, .* write 60 deg if",
     ),
+    "a place beside a figure of its own": (
+        lambda m: trunnion.tolerance(m, ["maximum:rotation:D"], at="60 deg"), trunnion.MechanismError,
+        "at: every measure has a place, a window or a figure of its own",
+    ),
 }  # fmt: skip
 
 

@@ -116,7 +116,6 @@ def test_the_list_and_its_file(program: Run, tmp_path: Path) -> None:
     }  # fmt: skip
     assert measures["drive-torque"]["stated"]
     assert measures["effort:O"]["value"] == measures["drive-torque"]["value"]
-    assert measures["stroke:S"]["verbs"] == ["sweep"]
     listed = vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"})).data()
     assert found == json.loads(json.dumps(listed))
 

@@ -93,12 +93,9 @@ def _list(model: Model, out: Path | None) -> None:
         numbers = [number for number in words.numbers if number.swept is swept]
         if numbers:
             show_rows(use, [*HEAD, "written as"], [_row(number, number.written) for number in numbers])
-    for verbs in dict.fromkeys(measure.verbs for measure in words.measures):
-        taking = ", ".join(("analyse", "tolerance", "allocate", *verbs))
-        title = f"measures of {taking}: figures of the cycle, or values at the start"
-        measures = [measure for measure in words.measures if measure.verbs == verbs]
-        measures.sort(key=lambda measure: not measure.stated)
-        show_rows(title, [*HEAD, "what"], [_row(measure, measure.text) for measure in measures])
+    measures = sorted(words.measures, key=lambda measure: not measure.stated)
+    title = "measures: figures of the cycle, or values at the start"
+    show_rows(title, [*HEAD, "what"], [_row(measure, measure.text) for measure in measures])
     say(placed(words.findings, model.file, ["measures"]))
     if out is not None:
         write_text(json.dumps(words.data(), ensure_ascii=False, indent=1) + "\n", out)

@@ -12,7 +12,6 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.cycle.model_measures import watched
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.measures.curves import MOTIONS
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
 from trunnion.model.measure_table import MEASURES
@@ -47,7 +46,7 @@ class NamedMeasure:
     """A measure by its name, what it is, its SI unit and value; NaN where there is none.
 
     stated: whether the model states it; value: its figure over the cycle, of one that has none by itself that at the
-    start; verbs: those that take it beside `analyse`, `tolerance` and `allocate`.
+    start.
     """
 
     name: str
@@ -55,7 +54,6 @@ class NamedMeasure:
     unit: str
     value: float
     stated: bool
-    verbs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -80,15 +78,14 @@ class Vocabulary:
 
 
 @np.errstate(all="ignore")
-def vocabulary(mechanism: Mechanism, steps: int = 360) -> Vocabulary:
+def vocabulary(mechanism: Mechanism) -> Vocabulary:
     """Every number and every measure of a mechanism by name, with unit and present value.
 
-    steps: positions over which the figures of the model's own measures are taken.
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    cycle_measures = watched(run, run.cycle.times(steps if run.cycle.duration > 0 else 1), FrictionMethod())
-    figures = dict(zip((item.name for item in cycle_measures.measures), cycle_measures.figures, strict=True))
+    of_cycle = watched(run, np.zeros(1), FrictionMethod())
+    figures = dict(zip((item.name for item in of_cycle.measures), of_cycle.figures, strict=True))
     listed = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
     starts = _at_the_start(run, listed)
     measures = []
@@ -96,9 +93,8 @@ def vocabulary(mechanism: Mechanism, steps: int = 360) -> Vocabulary:
         value = float(figures.get(measure.name, np.nan))
         value = value if np.isfinite(value) else starts.get(measure.name, np.nan)
         unit, is_stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
-        verbs = tuple(_verbs(run, measure))
-        measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, is_stated, verbs))
-    return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(cycle_measures.findings))
+        measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, is_stated))
+    return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(of_cycle.findings))
 
 
 def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
@@ -144,14 +140,3 @@ def _at_the_start(run: Run, measures: list[Measure]) -> dict[str, float]:
     single = [item for item in measures if item.single(run.system) and (item.of_motion or not open_)]
     courses = courses_of(run, single, np.zeros(1), FrictionMethod())[0]
     return {name: float(np.ravel(primal(parts[0]))[0]) for name, parts in courses.items()}
-
-
-def _verbs(run: Run, measure: Measure) -> Iterator[str]:
-    """Those that take a measure, beside `analyse`, `tolerance` and `allocate`."""
-    single = measure.single(run.system)
-    if measure.kind in MOTIONS or single:
-        yield "play"
-    if measure.rule != "deviation" and not measure.of.against and not measure.of_attitude(run.system):
-        yield "sweep"
-    if single and measure.everywhere:
-        yield from ("rig", "compare", "identify")

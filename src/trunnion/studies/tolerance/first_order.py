@@ -124,7 +124,11 @@ def study(
     if run.cycle.duration <= 0:  # there is one position
         selected = [replace(one, statistic="value") if one.rule == "deviation" else one for one in selected]
     if at is not None:
-        selected = [placed(mechanism, measure, at) for measure in selected]
+        located = [placed(mechanism, measure, at) for measure in selected]
+        if all(measure in selected for measure in located):
+            what = "every measure has a place, a window or a figure of its own, which this does not change"
+            raise MechanismError(Finding(what, "at", "leave it out, or change at: of the measure"))
+        selected = located
     return ToleranceStudy(run, inputs, tuple(selected), steps, friction or FrictionMethod(), tuple(notes))
 
 

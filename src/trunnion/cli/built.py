@@ -164,12 +164,9 @@ def allocate(
     if not allocated:  # there is nothing to draw then
         files.out = [path for path in files.out or () if path.suffix.lower() not in IMAGES]
 
-    def nothing() -> None:
-        line(f"{result.attrs.get('name', '')}\nno allocation meets the limits".lstrip())
-
     parts = tables(result)
-    output = Shown(result, model, files, f"{SECTIONS} costs", drawn={"kind": kind}, tables=parts,
-                  show=None if parts else nothing)  # fmt: skip
+    show = None if parts else lambda: line(f"{result.attrs.get('name', '')}\nno allocation meets the limits".lstrip())
+    output = Shown(result, model, files, f"{SECTIONS} costs", drawn={"kind": kind}, tables=parts, show=show)
     output.write()
     if write is not None and allocated and not exit_status(findings):
         output.write_model(_bought(mechanism, result), write, force)

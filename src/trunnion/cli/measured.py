@@ -164,7 +164,8 @@ def identify(
     mechanism = model.read()
     with model.lines():
         unknowns, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
-        held_out = _held_out(hold_out or [])
+        shares = [float(text) for text in hold_out or () if text.replace(".", "", 1).isdecimal()]
+        held_out = shares[0] if len(shares) == len(hold_out or ()) == 1 else hold_out  # of the turns, or conditions
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         with bar("models evaluated", None) as progress:
             result = run(mechanism, measurement, unknowns, channel, begin, held_out, guard, progress=progress)
@@ -189,25 +190,15 @@ def parameters(texts: list[str]) -> dict[str, list[str]]:
     for text in texts:
         name, equals, listed = (part.strip() for part in text.partition("="))
         paths = [path.strip() for path in listed.split(",")] if equals else [name]
-        if not name or not all(paths):
+        if not name or not all(paths) or name in unknowns:
+            what = f"'{text}' names no number" if name not in unknowns else f"'{name}' is given twice"
             remedy = "write NAME, or NAME=PATH,PATH, e.g. pins=pin-1.friction.coefficient,pin-2.friction.coefficient"
-            raise MechanismError(Finding(f"'{text}' names no number", "--parameter", remedy))
-        if name in unknowns:
-            raise MechanismError(Finding(f"'{name}' is given twice", "--parameter", "give all its numbers at once"))
+            raise MechanismError(Finding(what, "--parameter", remedy))
         unknowns[name] = paths
     if not unknowns:
         remedy = "add --parameter joint_defaults.friction.coefficient, or another number of the model"
         raise MechanismError(Finding("no parameter to identify is given", "--parameter", remedy))
     return unknowns
-
-
-def _held_out(texts: list[str]) -> float | list[str] | None:
-    """A share of the turns, or names of conditions."""
-    try:
-        (share,) = map(float, texts)
-        return share
-    except ValueError:
-        return texts or None
 
 
 def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tuple[Mechanism | None, list[Finding]]":

@@ -162,19 +162,15 @@ def simulate(
     from trunnion.dynamics.opened import in_play
     from trunnion.dynamics.simulate import simulated
     from trunnion.dynamics.steady_cycle import UnsteadyError
-    from trunnion.results.tables import check_table
 
-    of = "cycle" if steady else "motion"
-    check_files(files, of, kind if files.out else None)
     duration = seconds(time, "--time", "2s")
     mechanism = model.read()
-    if not in_play(mechanism):  # then there are no contacts to write or draw
-        for path in files.out or ():
-            check_table(path, of, in_play=False)
-        if kind and files.out:
-            from trunnion.views.motion.figure import check_contacts  # with matplotlib
+    contacts = bool(in_play(mechanism))  # else there are none to write or draw
+    check_files(files, "cycle" if steady else "motion", kind if files.out else None, in_play=contacts)
+    if kind and files.out:
+        from trunnion.views.motion.figure import check_contacts  # with matplotlib
 
-            check_contacts(kind, in_play=False)
+        check_contacts(kind, contacts)
     with model.lines(), bar("%", PERCENT) as progress:
         reached = None if progress is None else lambda share: progress(int(PERCENT * share))
         try:

@@ -30,10 +30,12 @@ YAML, MODELS = (".yaml", ".yml"), (".yaml", ".yml", ".json")
 # ---- before anything is computed ------------------------------------------------------------------------------
 
 
-def check_files(files: Files, of: str = "", kind: str | None = None, drawn: bool = True, instead: str = "") -> None:
+def check_files(
+    files: Files, of: str = "", kind: str | None = None, drawn: bool = True, instead: str = "", in_play: bool = True
+) -> None:
     """MechanismError for a file that cannot be written, or a table or figure that a result of some kind (`of`) has not.
 
-    drawn: whether figures can be written; instead: what writes them where they cannot.
+    drawn: whether figures can be written; instead: what writes them where they cannot; in_play: whether a joint is.
     """
     others = IMAGES if drawn else ()
     for key in ("units_row", "columns"):
@@ -49,7 +51,7 @@ def check_files(files: Files, of: str = "", kind: str | None = None, drawn: bool
 
             check_format(path, others)
             if of:
-                check_table(path, of)
+                check_table(path, of, in_play)
     if files.report is not None:
         check_target(files.report, "--report", "a report", PAGES)
     if kind is not None:

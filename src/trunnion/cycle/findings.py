@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import primal
-from trunnion.cycle.course import CycleCourse, Means, course_of, magnitude
+from trunnion.cycle.course import CycleCourse, Means, course_of
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
-from trunnion.cycle.model_findings import far_hints, of_run
+from trunnion.cycle.model_findings import of_run
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, Status, agreeing
@@ -39,7 +39,6 @@ __all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed"]
 
 Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
-MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
 CLASS_TWO = 2
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
@@ -100,8 +99,7 @@ def listed(places: Sequence[str]) -> str:
 
 def findings(cycle: Cycle) -> list[Finding]:
     """What is to be known of a mechanism over its cycle."""
-    hints = cycle.run.once("far hints", lambda: list(far_hints(cycle.run)))
-    return [*of_run(cycle.run, hints), *(finding for question in QUESTIONS for finding in question(cycle))]
+    return [*of_run(cycle.run), *(finding for question in QUESTIONS for finding in question(cycle))]
 
 
 def effort_units(system: System) -> list[str]:
@@ -308,14 +306,14 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
 
 
 def _springs(cycle: Cycle) -> Iterator[Finding]:
-    """Springs whose torque jumps, that never act, or whose ends pass each other."""
+    """Springs whose torque jumps, or that never act."""
     run, springs = cycle.run, cycle.mechanism.springs
     if not springs:
         return
     courses = cycle.course_of(lambda time: [state.elongation for *_, state in loads.springs(run.walk(time))])
     for row, (name, spring) in enumerate(springs.items()):
         where, elongation = f"springs.{name}", courses.picked(np.array([row]))
-        free, preload = (float(np.max(run.values.get(f"{where}.{key}", 0.0))) for key in ("free_length", "preload"))
+        free = float(np.max(run.values.get(f"{where}.free_length", 0.0)))
         least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
         if least is None or most is None:
             continue
@@ -331,13 +329,6 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
             what = f"never acts: it can only {spring.only}, its free length is {readable(free, 'm')}, and the length "
             what += f"nearest to that is {readable(nearest, 'm')}"
             yield Finding.warning("spring.never_acts", where, what, free=free, nearest=nearest)
-        bears = spring.between is not None and spring.only != "pull" and (free or preload)
-        if bears and least.value + free <= MEETS * (most.value + free):
-            what = f"its ends pass each other at {cycle.place(least.time)}: its length falls to about 0, and its "
-            remedy = "move one end along its line, with the free length, so that they stay apart"
-            yield Finding.warning(
-                "spring.turned_round", where, f"{what}force reverses", remedy, at=cycle.place(least.time)
-            )
 
 
 def _slack(cycle: Cycle) -> Iterator[Finding]:
@@ -423,21 +414,6 @@ def _work(cycle: Cycle, means: Means) -> dict[str, float]:
 
 
 # ---- pins and errors ------------------------------------------------------------------------------------------
-
-
-def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
-    """Efforts that are largest next to where pins cross their play, and nearer to it are not known."""
-    course = cycle.course
-    if course is None or Status.CONTACT_LOST not in course.status:
-        return
-    for i, name in enumerate(cycle.mechanism.drivers):
-        largest = course.extreme("drive_effort", i, of=magnitude)
-        if largest is not None and course.beside(largest, Status.CONTACT_LOST):
-            what = f"the largest effort, at {course.told(largest).removeprefix('at ')}, is where pins begin or end to "
-            what += "cross their play; while they cross it is not known"
-            remedy = "see `trunnion simulate` for the forces of pins that cross their play"
-            figures = {"at": course.told(largest).removeprefix("at ")}
-            yield Finding.note("effort.beside_gap", f"drivers.{name}", what, remedy, **figures)
 
 
 def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
@@ -528,5 +504,5 @@ def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[fl
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
     _not_assembled, _without_answer, _locked, _resting, _ranges, _no_common_period, _driving_resistances, _springs,
-    _slack, _idle_loads, _beside_gaps, _uncounted_work, _lost_contacts,
+    _slack, _idle_loads, _uncounted_work, _lost_contacts,
 )  # fmt: skip

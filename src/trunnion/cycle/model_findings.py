@@ -2,67 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import AT
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
-from trunnion.results.quantities import quantity, readable
-from trunnion.solve.assembly import grid
-from trunnion.solve.drawn import hinted_at
-from trunnion.solve.forward import start
-from trunnion.solve.space.determinacy import spins_of
 from trunnion.solve.system import System
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["far_hints", "model_notes", "of_run", "shared_dimensions"]
+__all__ = ["model_notes", "of_run", "shared_dimensions"]
 
-FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 MOST_PLACES = 8  # named in one sentence
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 
 
-def of_run(run: Run, hints: Sequence[Finding] = (), notes: bool = True) -> list[Finding]:
-    """What there is to say before any position is solved. hints: on how it is assembled; notes: of the model, too."""
+def of_run(run: Run, notes: bool = True) -> list[Finding]:
+    """What there is to say before any position is solved. notes: of the model, too."""
     model = run.once("notes", lambda: model_notes(run.system.mechanism, run.system))
     graver = [finding for finding in model if notes or finding.severity is not Severity.NOTE]
-    return [*graver, *run.chosen.findings, *hints, *(run.determinacy.findings() if run.determinacy else [])]
-
-
-def far_hints(run: Run) -> Iterator[Finding]:
-    """Hints of places that are far from where their points are then: they choose an assembly by chance."""
-    size = float(np.ravel(primal(run.system.size(run.values)))[0])
-    times = grid(run.cycle)
-    lane = hinted_at(start(run.system, run.values), times)
-    walk, when = run.walk(times[lane : lane + 1]), f"with {AT} at its place" if lane else "at the start"
-    spins = [(members, ends) for _, (_, *ends), members in spins_of(run.system)]
-    for name, hint in run.system.mechanism.assembly.items():
-        if not isinstance(hint, tuple):
-            continue
-        link, _, point = name.rpartition(".")
-        link = link or run.system.joints[name][1][1]
-        if any(link in members and point not in ends for members, ends in spins):
-            continue  # it may be anywhere about the line
-        place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
-        numbers = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
-        distance = float(np.linalg.norm(np.subtract(place, numbers)))
-        if distance > FAR * size:
-            words = ", ".join(quantity(part, "m") for part in place)
-            what = f"the hint for {name} is {readable(distance, 'm')} from where {name} is {when}"
-            remedy = f"check the hint or the lengths; {when} it is at {words}"
-            figures = {"point": name, "distance": distance, "place": words}
-            yield Finding.warning("assembly.far_hint", f"assembly.{name}", what, remedy, **figures)
+    return [*graver, *run.chosen.findings, *(run.determinacy.findings() if run.determinacy else [])]
 
 
 def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
@@ -87,17 +52,6 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     if points:
         what = f"{', '.join(points)} have a mass but no inertia: each is a point mass at its centre"
         notes.append(Finding.note("model.point_mass", "links", what, "state inertia: …", links=points))
-    tight = [
-        name
-        for name, joint in mechanism.effective_joints.items()
-        if joint.seat not in (None, "free")
-        and play.get(name) is not None
-        and f"joints.{name}.pin.hole_radius" in values
-    ]
-    if tight:
-        what = f"{', '.join(tight)} have a seat but no play at nominal size: these joints are ideal"
-        remedy = "analyse with --set fits=maximum for the largest play"
-        notes.append(Finding.note("model.seat_without_play", "joints", what, remedy, joints=tight))
     if playing:
         # no seats are taken where links are over-constrained
         redundant_joints = {name for module in system.plan.modules if module.redundant for name in module.joints}

@@ -26,7 +26,7 @@ from mechanisms import (
 )
 from trunnion import FrictionMethod, Mechanism, MechanismError, Status
 from trunnion.errors import Severity
-from trunnion.model.checks.values import check_values
+from trunnion.model.checks.check import check_values
 from trunnion.model.parameters import ParameterSet
 
 FORCES = ["drive_effort", "drive_effort_lower", "drive_effort_upper", "reaction_force", "friction_power", "drive_power"]

@@ -108,7 +108,7 @@ class Model:
 
 def _bare(mechanism: "Mechanism", values: Mapping[str, float | str]) -> Iterator[Finding]:
     """Numbers that lack the unit that the model has."""
-    from trunnion.model.checks.forgotten_units import bare_number
+    from trunnion.model.checks.units import bare_number
 
     numbers = mechanism.parameter_set
     for name, value in values.items():

@@ -14,7 +14,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.angles import within
 from trunnion.measures.measures import Measure
-from trunnion.model.checks.forgotten_units import in_radians
+from trunnion.model.checks.units import in_radians
 from trunnion.model.measure_units import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity

@@ -70,7 +70,6 @@ FUNCTIONS: Final[Mapping[str, _Function]] = {
 }
 # what says the same, of functions that other languages have
 SIGN = "the sign of a speed v is max(-1, min(1, v / (1 mm/s))); what opposes a motion is resisting_force: or _torque:"
-INSTEAD: Final[Mapping[str, str]] = dict.fromkeys(("sign", "sgn", "signum", "tanh"), SIGN)
 RESERVED = frozenset({"pi", *FUNCTIONS})  # names a dimension cannot have
 MOTION = ("drive", "speed", "time")  # nor these: in loads, coordinate and rate of the first driver, and time
 PLACED = "."  # in a name: of a joint or a point, as in the columns of a result: S.slide, ram.Q.x, O.rotation_velocity
@@ -86,40 +85,66 @@ class Literal:
 
 
 @dataclass(frozen=True)
+class _Part:
+    """A part of an expression, compiled.
+
+    value: of the values of the names; dimension: from the dimensions of the names; operands: what it is made of;
+    parts: those below it; passes: how an angle that is wanted of it is wanted of these, by the dimensions of the names
+    (of a literal, a name, a product or a power it is not).
+    """
+
+    value: Evaluator
+    dimension: Callable[[Dimensions], Dimension | None]
+    operands: tuple[Literal | str, ...]
+    parts: tuple[_Part, ...] = ()
+    passes: Callable[[Dimensions, bool], bool] | None = None
+    function: str = ""
+
+
+@dataclass(frozen=True)
 class Expression:
     """A parsed expression.
 
     names: the dimensions it speaks of; evaluate: values of those (SI floats, arrays, duals) to a value;
-    literal: set if it is nothing but one number with its unit (and perhaps a minus); kinks: functions of the same
-    values, where one of which changes its sign the value jumps or bends: at both ends of a `between`, of an `abs` …
+    literal: set if it is nothing but one number with its unit (and perhaps a minus); bare: whether it has neither a
+    unit nor a name in it; kinks: functions of the same values, where one of which changes its sign the value jumps or
+    bends: at both ends of a `between`, of an `abs` …
     """
 
     names: tuple[str, ...]
     evaluate: Evaluator
     literal: Literal | None
-    bare: bool  # neither a unit nor a name in it: only numbers
+    bare: bool
     kinks: tuple[Evaluator, ...]
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
+    _part: _Part = field(repr=False)
+
+    @classmethod
+    def of(cls, tree: ast.expr, operands: Mapping[str, Literal | str]) -> Expression:
+        """The expression of a tree whose names stand for operands."""
+        part = _compile(tree, operands)
+        names = dict.fromkeys(item for item in operands.values() if isinstance(item, str) and item not in RESERVED)
+        literals = [operand for operand in operands.values() if isinstance(operand, Literal)]
+        core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
+        alone = literals[0] if isinstance(core, ast.Name) and literals else None
+        bare = len(literals) == len(operands) and not any(operand.unit for operand in literals)
+        return cls(tuple(names), part.value, alone, bare, tuple(_kinks(part)), tree, operands, part)
 
     def __reduce__(self) -> tuple[Callable[..., Expression], tuple[ast.expr, Mapping[str, Literal | str]]]:
         """Compiled anew in another process: closures cannot be pickled."""
-        return _expression, (self._tree, self._operands)
+        return Expression.of, (self._tree, self._operands)
 
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
-        return _dimension(self._tree, self._operands, names)
-
-    def is_plain(self, plain: Collection[str]) -> bool:
-        """Whether it is made of numbers without a unit alone; plain: dimensions that are."""
-        return _is_plain(self._tree, self._operands, plain)
+        return self._part.dimension(names)
 
     def unitless_angles(self, names: Dimensions, plain: Collection[str], angle: bool) -> Iterator[str | float]:
         """Numbers without a unit, and dimensions that are such (plain), that are taken as radians.
 
         They stand for an angle where the whole is one, beside a term that is one, or in sin, cos and tan.
         """
-        return _unitless_angles(self._tree, self._operands, names, plain, angle)
+        return _unitless(self._part, names, plain, angle)
 
 
 def literal(number: str, unit_text: str) -> Literal:
@@ -155,19 +180,7 @@ def parse(text: str) -> Expression:
         raise UnitError(f"'{text}' cannot be read", "check operators and parentheses") from None
     if depth > MAX_DEPTH:
         raise UnitError(f"'{text[:40]}…' is nested too deeply", "split it in dimensions")
-    return _expression(tree, operands)
-
-
-def _expression(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Expression:
-    evaluate = _compile(tree, operands)
-    names = tuple(
-        dict.fromkeys(operand for operand in operands.values() if isinstance(operand, str) and operand not in RESERVED)
-    )
-    literals = [operand for operand in operands.values() if isinstance(operand, Literal)]
-    core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
-    alone = literals[0] if isinstance(core, ast.Name) and literals else None
-    bare = len(literals) == len(operands) and not any(operand.unit for operand in literals)
-    return Expression(names, evaluate, alone, bare, tuple(_kinks(tree, operands)), tree, operands)
+    return Expression.of(tree, operands)
 
 
 def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
@@ -178,26 +191,22 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
     text = text.strip()
     while place < len(text):
         match = _TOKEN.match(text, place)
-        if not match:
-            raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text, place))
+        if not match or (match["operator"] == "," and "(" not in source):
+            rest = "," if match else text[place:].strip()[:20]
+            raise UnitError(f"'{rest}' is not understood in '{text}'", _hint(text, place))
         if power := _RECIPROCAL.match(text, place):
             what = f"'{power['power']}' is {power['unit']} less {power['power'][-1]} in '{text}'"
             raise UnitError(what, "write an angular speed in rpm or rad/s, a power of a unit as s^-1")
         operator = match["operator"]
-        if operator is None and after_operand:
-            raise UnitError(
-                f"an operator is missing before '{match[0].strip()}' in '{text}'",
-                "write a product as 2 * AB, a quantity as 60 mm",
-            )
-        if operator is None:
-            key = f"_{len(operands)}"
-            number = match["number"]
-            operands[key] = literal(number, match["unit"] or match["per"] or "") if number else match["name"]
-            source.append(key)
-        else:
-            if operator == "," and "(" not in source:
-                raise UnitError(f"',' is not understood in '{text}'", _hint(text, place))
+        if operator is not None:
             source.append("**" if operator == "^" else operator)
+        elif after_operand:
+            what = f"an operator is missing before '{match[0].strip()}' in '{text}'"
+            raise UnitError(what, "write a product as 2 * AB, a quantity as 60 mm")
+        else:
+            source.append(f"_{len(operands)}")
+            number = match["number"]
+            operands[source[-1]] = literal(number, match["unit"] or match["per"] or "") if number else match["name"]
         after_operand = operator is None or operator == ")"
         place = match.end()
     return " ".join(source), operands
@@ -217,6 +226,8 @@ def _depth(tree: ast.expr) -> int:
     return 1 + max((_depth(child) for child in ast.iter_child_nodes(tree) if isinstance(child, ast.expr)), default=0)
 
 
+# ---- a tree, compiled -----------------------------------------------------------------------------------------
+
 _OPERATORS: Mapping[type[ast.operator], Callable[[Number, Number], Number]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
@@ -226,33 +237,29 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Number, Number], Number]] = {
 }
 
 
-def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Evaluator:
+def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> _Part:
     """The tree as nested closures. Constants are NumPy floats, so that 1/0 and (-1)^0.5 give inf and nan, data."""
     match tree:
         case ast.Name(id=key):
             return _operand(operands[key])
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            value = _compile(inner, operands)
-            return lambda names: -value(names)
-        case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-            return _compile(inner, operands)
-        case ast.BinOp(op=ast.Pow(), left=base, right=exponent) if (power := _integer(exponent, operands)) is not None:
-            value, integer_power = _compile(base, operands), power  # an int: duals of negative numbers have powers
-            return lambda names: value(names) ** integer_power
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):
+            part, negative = _compile(inner, operands), isinstance(sign, ast.USub)
+            value: Evaluator = (lambda names: -part.value(names)) if negative else part.value
+            return _Part(value, part.dimension, part.operands, (part,), lambda names, angle: angle)
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _OPERATORS:
-            combine, first, second = _OPERATORS[type(operator)], _compile(left, operands), _compile(right, operands)
-            return lambda names: combine(first(names), second(names))
+            return _binary(operator, _compile(left, operands), _compile(right, operands), _integer(right, operands))
         case ast.Call(func=ast.Name(id=key), args=arguments, keywords=[]):
-            return _call(operands[key], [_compile(argument, operands) for argument in arguments])
+            return _call(operands[key], tuple(_compile(argument, operands) for argument in arguments))
     raise UnitError("an expression has a part that is no number, name, operator or function", _hint(""))
 
 
-def _operand(operand: Literal | str) -> Evaluator:
+def _operand(operand: Literal | str) -> _Part:
     if isinstance(operand, Literal):
         constant = np.float64(operand.value)
-        return lambda names: constant
+        dimension = operand.dimension if operand.value or operand.unit else None  # a bare 0 fits anywhere
+        return _Part(lambda names: constant, lambda names: dimension, (operand,))
     if operand == "pi":
-        return lambda names: np.float64(np.pi)
+        return _Part(lambda names: np.float64(np.pi), lambda names: NUMBER, (operand,))
     if operand in FUNCTIONS:
         speed = "; an angular speed is in rpm or rad/s" if operand == "min" else ""
         raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…){speed}")
@@ -262,7 +269,7 @@ def _operand(operand: Literal | str) -> Evaluator:
         value = names[name]
         return np.float64(value) if isinstance(value, (float, int)) else value
 
-    return look_up
+    return _Part(look_up, lambda names: names[name], (operand,))
 
 
 def _integer(tree: ast.expr, operands: Mapping[str, Literal | str]) -> int | None:
@@ -275,108 +282,109 @@ def _integer(tree: ast.expr, operands: Mapping[str, Literal | str]) -> int | Non
     return -int(operand.value) if negative else int(operand.value)
 
 
-def _call(name: Literal | str, arguments: list[Evaluator]) -> Evaluator:
+def _binary(operator: ast.operator, first: _Part, second: _Part, exponent: int | None) -> _Part:
+    """Two parts and an operator. exponent: the second as an int if it is a whole literal number."""
+    combine, operands, parts = _OPERATORS[type(operator)], (*first.operands, *second.operands), (first, second)
+
+    def value(names: Mapping[str, Number]) -> Number:
+        return combine(first.value(names), second.value(names))
+
+    def terms(names: Dimensions) -> Dimension | None:
+        return _same([first.dimension(names), second.dimension(names)], "added")
+
+    def product(names: Dimensions) -> Dimension | None:
+        one, other = first.dimension(names), second.dimension(names)
+        if one is None or other is None:
+            return None
+        return _combine(one, other, Fraction(1 if isinstance(operator, ast.Mult) else -1))
+
+    def power(names: Dimensions) -> Dimension | None:
+        base, above = first.dimension(names), second.dimension(names)
+        if above is not None and above != NUMBER:
+            raise UnitError(f"an exponent is {dimension_text(above)}", "an exponent must be a number without unit")
+        if base is None or base == NUMBER:
+            return base
+        if exponent is None:
+            raise UnitError(f"{dimension_text(base)} is raised to a power that is not a whole number", "use sqrt or ^2")
+        return _combine(NUMBER, base, Fraction(exponent))
+
+    if isinstance(operator, ast.Add | ast.Sub):
+        return _Part(value, terms, operands, parts, lambda names, angle: angle or terms(names) == ANGLE)
+    if isinstance(operator, ast.Mult | ast.Div):
+        return _Part(value, product, operands, parts)
+    if exponent is None:
+        return _Part(value, power, operands, parts)
+    return _Part(lambda names: first.value(names) ** exponent, power, operands, parts)  # duals below 0 have such powers
+
+
+def _call(name: Literal | str, arguments: tuple[_Part, ...]) -> _Part:
     if isinstance(name, Literal):
         raise UnitError("an operator is missing before a parenthesis", "write a product as 2 * (a + b)")
     if name not in FUNCTIONS:
-        instead = INSTEAD.get(name, "the functions are " + ", ".join(sorted(FUNCTIONS)))
-        raise UnitError(f"'{name}' is not a function", instead)
+        others = "the functions are " + ", ".join(sorted(FUNCTIONS))
+        raise UnitError(f"'{name}' is not a function", SIGN if name in ("sign", "sgn", "signum", "tanh") else others)
     function = FUNCTIONS[name]
     least, most = function.arguments
     if not least <= len(arguments) <= most:
         raise UnitError(f"{name} takes {least} argument{'s' * (least > 1)}, not {len(arguments)}", "separate them by ,")
 
-    def call(names: Mapping[str, Number]) -> Number:
-        values = [argument(names) for argument in arguments]
-        if name == "between":
-            return _between(*values)
+    def value(names: Mapping[str, Number]) -> Number:
+        values = [argument.value(names) for argument in arguments]
+        if name == "between":  # it switches a load on over part of the motion
+            place, low, high = values
+            return namespace(*values).where((place >= low) & (place < high), 1.0, 0.0)
         apply = getattr(namespace(*values), function.name)
         return reduce(apply, values) if len(values) > 1 else apply(values[0])
 
-    return call
+    def dimension(names: Dimensions) -> Dimension | None:
+        common = _same([argument.dimension(names) for argument in arguments], f"combined in {name}")
+        needed = {"angle": ANGLE, "number": NUMBER}.get(function.takes)
+        if needed is not None and common is not None and not fits(common, needed):
+            raise UnitError(f"{name} is given {dimension_text(common)}", f"{name} takes {dimension_text(needed)}")
+        if function.gives in ("angle", "number"):
+            return ANGLE if function.gives == "angle" else NUMBER
+        return common if function.gives == "same" or common is None else _combine(NUMBER, common, Fraction(1, 2))
+
+    def passes(names: Dimensions, angle: bool) -> bool:
+        if function.takes == "same" and any(argument.dimension(names) == ANGLE for argument in arguments):
+            return True
+        return function.takes == "angle" or (angle and function.gives == "same")
+
+    operands = (name, *(operand for argument in arguments for operand in argument.operands))
+    return _Part(value, dimension, operands, arguments, passes, name)
 
 
-def _between(value: Number, low: Number, high: Number) -> Number:
-    """1 from `low` up to `high`, 0 elsewhere: it switches a load on over part of the motion."""
-    xp = namespace(value, low, high)
-    return xp.where((value >= low) & (value < high), 1.0, 0.0)
+def _kinks(part: _Part) -> Iterator[Evaluator]:
+    """Functions whose sign decides which side of a switch a part is on."""
+
+    def less(first: Evaluator, other: Evaluator) -> Evaluator:
+        return lambda names: first(names) - other(names)
+
+    values = [below.value for below in part.parts]
+    if part.function == "between":
+        yield from (less(values[0], end) for end in values[1:])
+    elif part.function in ("min", "max"):
+        yield from (less(argument, other) for argument, other in combinations(values, 2))
+    elif part.function in ("abs", "atan2"):  # an angle jumps by a turn where its first argument passes 0
+        yield values[0]
+    for below in part.parts:
+        yield from _kinks(below)
 
 
-def _kinks(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Iterator[Evaluator]:
-    """Functions whose sign decides which side of a switch a tree that `_compile` accepted is on."""
-    for part in ast.walk(tree):
-        if not isinstance(part, ast.Call) or not isinstance(part.func, ast.Name):
-            continue
-        name, values = operands[part.func.id], [_compile(argument, operands) for argument in part.args]
-        if name == "between":
-            yield from (_less(values[0], end) for end in values[1:])
-        elif name in ("min", "max"):
-            yield from (_less(argument, other) for argument, other in combinations(values, 2))
-        elif name in ("abs", "atan2"):  # an angle jumps by a turn where its first argument passes 0
-            yield values[0]
-
-
-def _less(first: Evaluator, other: Evaluator) -> Evaluator:
-    return lambda names: first(names) - other(names)
-
-
-def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions) -> Dimension | None:
-    """Dimension of a tree that `_compile` accepted; None where a plain number leaves it unknown."""
-
-    def of(part: ast.expr) -> Dimension | None:
-        return _dimension(part, operands, names)
-
-    match tree:
-        case ast.Name(id=key):
-            operand = operands[key]
-            if isinstance(operand, Literal):
-                return operand.dimension if operand.value or operand.unit else None  # a bare 0 fits anywhere
-            return NUMBER if operand == "pi" else names[operand]
-        case ast.UnaryOp(operand=inner):
-            return of(inner)
-        case ast.BinOp(op=ast.Pow(), left=base, right=exponent):
-            return _power(of(base), of(exponent), exponent, operands)
-        case ast.BinOp(op=ast.Mult() | ast.Div() as operator, left=left, right=right):
-            first, second = of(left), of(right)
-            if first is None or second is None:
-                return None
-            return _combine(first, second, Fraction(1 if isinstance(operator, ast.Mult) else -1))
-        case ast.BinOp(left=left, right=right):
-            return _same([of(left), of(right)], "added")
-        case ast.Call(func=ast.Name(id=key), args=arguments):
-            return _function_dimension(str(operands[key]), [of(argument) for argument in arguments])
-    raise AssertionError("every node was checked when compiled")
-
-
-def _is_plain(tree: ast.expr, operands: Mapping[str, Literal | str], plain: Collection[str]) -> bool:
-    leaves = [operands[part.id] for part in ast.walk(tree) if isinstance(part, ast.Name)]
-    return all(
-        leaf in plain if isinstance(leaf, str) else not leaf.unit for leaf in leaves
-    )  # neither pi nor a function
-
-
-def _unitless_angles(
-    tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions, plain: Collection[str], angle: bool
-) -> Iterator[str | float]:
-    """`Expression.unitless_angles` of a tree whose dimension was found."""
-    parts = [part for part in ast.iter_child_nodes(tree) if isinstance(part, ast.expr)]
-    match tree:
-        case ast.BinOp(op=ast.Add() | ast.Sub()):
-            angle = angle or _dimension(tree, operands, names) == ANGLE
-        case ast.Call(func=ast.Name(id=key), args=parts):
-            function = FUNCTIONS[str(operands[key])]
-            angular = function.takes == "same" and any(_dimension(leaf, operands, names) == ANGLE for leaf in parts)
-            angle = function.takes == "angle" or angular or (angle and function.gives == "same")
-        case ast.Name() | ast.BinOp():
-            if angle and _is_plain(tree, operands, plain):
-                leaves = [operands[part.id] for part in ast.walk(tree) if isinstance(part, ast.Name)]
-                dimensions = [leaf for leaf in leaves if isinstance(leaf, str)]
+def _unitless(part: _Part, names: Dimensions, plain: Collection[str], angle: bool) -> Iterator[str | float]:
+    """`Expression.unitless_angles` of a part. angle: whether it is wanted as one."""
+    if part.passes:
+        angle = part.passes(names, angle)
+    elif angle:
+        dimensions = [operand for operand in part.operands if isinstance(operand, str)]  # functions and pi among them
+        if not any(operand.unit for operand in part.operands if isinstance(operand, Literal)):
+            if dimensions and {*plain}.issuperset(dimensions):
                 yield from dimensions
-                if not dimensions:
-                    yield float(_compile(tree, operands)({}))
-            angle = False
-    for part in parts:
-        yield from _unitless_angles(part, operands, names, plain, angle)
+            elif not dimensions:
+                yield float(part.value({}))
+        angle = False
+    for below in part.parts:
+        yield from _unitless(below, names, plain, angle)
 
 
 def _combine(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
@@ -385,44 +393,12 @@ def _combine(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
     return length, mass, time, angle
 
 
-def _power(
-    base: Dimension | None, exponent: Dimension | None, tree: ast.expr, operands: Mapping[str, Literal | str]
-) -> Dimension | None:
-    if exponent is not None and exponent != NUMBER:
-        raise UnitError(f"an exponent is {dimension_text(exponent)}", "an exponent must be a number without unit")
-    if base is None or base == NUMBER:
-        return base
-    integer_power = _integer(tree, operands)
-    if integer_power is None:
-        raise UnitError(f"{dimension_text(base)} is raised to a power that is not a whole number", "use sqrt or ^2")
-    return _combine(NUMBER, base, Fraction(integer_power))
-
-
 def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:
     """The common dimension of terms; an angle beside pure numbers makes an angle."""
-    dimensions_known = [dimension for dimension in dimensions if dimension is not None]
-    if not dimensions_known:
-        return None
-    result = next((dimension for dimension in dimensions_known if dimension != NUMBER), NUMBER)
-    for dimension in dimensions_known:
-        if not fits(dimension, result):
-            raise UnitError(
-                f"{dimension_text(result)} and {dimension_text(dimension)} are {verb}",
-                "give every number its unit, such as 3 mm",
-            )
+    terms = [dimension for dimension in dimensions if dimension is not None]
+    result = next((dimension for dimension in terms if dimension != NUMBER), NUMBER if terms else None)
+    for dimension in terms:
+        if result is not None and not fits(dimension, result):
+            what = f"{dimension_text(result)} and {dimension_text(dimension)} are {verb}"
+            raise UnitError(what, "give every number its unit, such as 3 mm")
     return result
-
-
-def _function_dimension(name: str, arguments: list[Dimension | None]) -> Dimension | None:
-    function = FUNCTIONS[name]
-    common = _same(arguments, f"combined in {name}")
-    needed = {"angle": ANGLE, "number": NUMBER}.get(function.takes)
-    if needed is not None and common is not None and not fits(common, needed):
-        raise UnitError(f"{name} is given {dimension_text(common)}", f"{name} takes {dimension_text(needed)}")
-    results: Mapping[str, Dimension | None] = {
-        "angle": ANGLE,
-        "number": NUMBER,
-        "same": common,
-        "root": None if common is None else _combine(NUMBER, common, Fraction(1, 2)),
-    }
-    return results[function.gives]

@@ -58,6 +58,11 @@ class Fields(Part):
         """How many coordinates a point has: 2 or 3."""
         return 2 if self.space == "planar" else 3
 
+    @property
+    def position_form(self) -> str:
+        """How a position is written."""
+        return "[x, y]" if self.space == "planar" else "[x, y, z]"
+
     @cached_property
     def fixed_link(self) -> str:
         """The link that does not move: `ground`, else the link of that name or named frame; empty if there is none."""

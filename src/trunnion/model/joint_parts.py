@@ -86,7 +86,7 @@ _check_contact, _schema_contact = known(tuple(CONTACT_LAWS), "contact law")
 _check_model, _schema_model = known(FRICTION_MODELS, "friction model")
 
 JointType = Annotated[str, _check_type, _schema_type]
-Pitch = Annotated[Length, NotZero("the thread does not advance", "give another pitch, or state type: revolute")]
+Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
 _FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
@@ -181,8 +181,8 @@ class Guide(Part):
     clearance: Annotated[Length | None, NotNegative] = None
 
 
-LAW = Selects("contact law", CONTACT_LAWS, {"restitution": "0.8"})
-MATERIAL = OnlyWith("modulus", "add modulus: 210 GPa, or remove it")
+LAW = Selects("contact law", CONTACT_LAWS)
+MATERIAL = OnlyWith("modulus")
 
 
 class Contact(Part):
@@ -251,7 +251,7 @@ class Misalignment(Part):
     offset, offset_towards: and is moved by this length along that one, `towards` if not stated.
     """
 
-    tilt: Annotated[Angle | None, Within(-math.pi / 4, math.pi / 4, remedy="turn the axis of the point instead")] = None
+    tilt: Annotated[Angle | None, Within(-math.pi / 4, math.pi / 4)] = None
     towards: Angle | None = None
     offset: Length | None = None
     offset_towards: Angle | None = None

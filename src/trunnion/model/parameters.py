@@ -252,9 +252,8 @@ def _of_law(friction: Friction, entry: Entry) -> Entry:
     law_unit = declared.unit or "1"
     usual = next((kind for kind in KINDS.values() if kind.unit == law_unit), None)
     kind = usual or Kind(parameter, law_unit, f"1 {law_unit}", (unit(law_unit)[1],))
-    none = parameter == "pair_factor"  # at 0 there would be no friction, which is stated as such
-    limits = Within(declared.minimum, declared.maximum, *(("(]", "friction: 0 is without friction") if none else ()))
-    return replace(entry, kind=kind, rules=(limits,))
+    ends = "(]" if parameter == "pair_factor" else "[]"  # at 0 there would be no friction, which is stated as such
+    return replace(entry, kind=kind, rules=(Within(declared.minimum, declared.maximum, ends),))
 
 
 def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:

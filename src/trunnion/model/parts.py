@@ -137,17 +137,10 @@ class Link(Part):
     useful: bool = False
 
 
-_MOTOR_EXAMPLES = {
-    "effort": "4 N m", "stall_effort": "4 N m", "no_load_speed": "1500 rpm", "breakdown_effort": "20 N m",
-    "breakdown_slip": "0.2", "synchronous_speed": "1500 rpm", "points": "[[0 rpm, 4 N m], [1500 rpm, 0 N m]]",
-    "target": "300 rpm", "proportional": "0.5 N m s/rad", "limit": "10 N m",
-}  # fmt: skip
 _OF_ALL_MOTORS = (
     *("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from"),
     *("clutch", "clutch_from", "clutch_until"),
 )
-_ROTOR = "add inertia: 0.02 kg m^2 of the rotor, on the motor's side, which turns by itself while the clutch slips"
-_CLUTCH = "add clutch: 5 N m, what it transmits at most"
 
 
 class Motor(Part):
@@ -159,7 +152,7 @@ class Motor(Part):
     side; it is engaged from the time clutch_from to clutch_until.
     """
 
-    kind: Annotated[str, _check_motor, _schema_motor, Selects("motor", MOTORS, _MOTOR_EXAMPLES, also=_OF_ALL_MOTORS)]
+    kind: Annotated[str, _check_motor, _schema_motor, Selects("motor", MOTORS, _OF_ALL_MOTORS)]
     effort: ForceOrMoment | None = None
     stall_effort: ForceOrMoment | None = None
     no_load_speed: Annotated[Rate | None, NotZero("the motor has no speed")] = None
@@ -173,14 +166,16 @@ class Motor(Part):
     integral: Annotated[Stiffness | None, NotNegative] = None
     limit: Annotated[ForceOrMoment | None, Positive] = None
     ratio: Annotated[Dimensionless | None, NotZero("the motor would not turn")] = None
-    efficiency: Annotated[Dimensionless | None, Within(0, 1, "(]", "such as 0.95")] = None
+    efficiency: Annotated[Dimensionless | None, Within(0, 1, "(]")] = None
     inertia: Annotated[MassOrInertia | None, NotNegative] = None
     off_from: Annotated[Time | None, NotNegative] = None
-    brake: Annotated[ForceOrMoment | None, NotNegative, OnlyWith("brake_from", "add brake_from: 0.5 s")] = None
-    brake_from: Annotated[Time | None, NotNegative, OnlyWith("brake", "add brake: 5 N m")] = None
-    clutch: Annotated[ForceOrMoment | None, Positive, OnlyWith("inertia", _ROTOR)] = None
-    clutch_from: Annotated[Time | None, NotNegative, OnlyWith("clutch", _CLUTCH)] = None
-    clutch_until: Annotated[Time | None, NotNegative, OnlyWith("clutch", _CLUTCH)] = None
+    brake: Annotated[ForceOrMoment | None, NotNegative, OnlyWith("brake_from")] = None
+    brake_from: Annotated[Time | None, NotNegative, OnlyWith("brake")] = None
+    clutch: Annotated[
+        ForceOrMoment | None, Positive, OnlyWith("inertia", "the inertia of the rotor, on the side of the motor")
+    ] = None
+    clutch_from: Annotated[Time | None, NotNegative, OnlyWith("clutch")] = None
+    clutch_until: Annotated[Time | None, NotNegative, OnlyWith("clutch")] = None
 
     @property
     def of(self) -> MotorKind:
@@ -195,18 +190,9 @@ class Initial(Part):
     speed: Rate | None = None
 
 
-_Columns = Annotated[tuple[str, str] | None, OnlyWith("file", "name the file: file: motion.csv")]
-_MOTION_EXAMPLES = {
-    "speed": "60 rpm", "amplitude": "20 deg", "period": "0.5 s", "range": "[0 deg, 90 deg]", "duration": "0.2 s",
-    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or file: motion.csv, or give a file by --table",
-}  # fmt: skip
-_FREE = "a motion that is found"
+_Columns = Annotated[tuple[str, str] | None, OnlyWith("file")]
 _LAW = Selects(
-    "motion law",
-    MOTION_LAWS,
-    _MOTION_EXAMPLES,
-    also=("moves", "free", "motor", "initial", "columns"),
-    instead={"file": "points"},
+    "motion law", MOTION_LAWS, also=("moves", "free", "motor", "initial", "columns"), instead={"file": "points"}
 )
 
 
@@ -220,17 +206,17 @@ class Driver(Part):
     moves: Annotated[
         str | None,
         Refers("joint"),
-        OnlyWith("prescribed", "remove it, or free and motor", "a motion that is prescribed"),
+        OnlyWith("prescribed", "a motion that is prescribed"),
     ] = None
-    speed: Annotated[Rate | None, NotZero("the driver does not move", "give a speed, however small")] = None
+    speed: Annotated[Rate | None, NotZero("the driver does not move")] = None
     start: AngleOrLength | None = None
     range: tuple[AngleOrLength, AngleOrLength] | None = None
     mean: AngleOrLength | None = None
-    amplitude: Annotated[AngleOrLength | None, NotZero("it never moves", "give it an extent")] = None
+    amplitude: Annotated[AngleOrLength | None, NotZero("it never moves")] = None
     period: Annotated[Time | None, Positive] = None
     phase: Angle | None = None
     duration: Annotated[Time | None, Positive] = None
-    return_duration: Annotated[Time | None, Positive, OnlyWith("returns", "remove it, or returns: false")] = None
+    return_duration: Annotated[Time | None, Positive, OnlyWith("returns")] = None
     dwell: Annotated[Time | None, NotNegative] = None
     returns: bool = True
     points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2), Rising("time")] | None = None
@@ -241,7 +227,7 @@ class Driver(Part):
     delay: Annotated[Time | None, NotNegative] = None
     free: bool = False
     motor: Motor | None = None
-    initial: Annotated[Initial | None, OnlyWith("found", "state free: true or a motor", _FREE)] = None
+    initial: Annotated[Initial | None, OnlyWith("found", "free: true or a motor")] = None
     _found_law: MotionLaw | None = PrivateAttr(None)
 
     @property
@@ -353,7 +339,7 @@ class Spring(Part):
 USUAL_PRESSURE_ANGLE = Quantity.read("20 deg", KINDS["angle"])
 
 
-_TEETH = OnlyWith("teeth", "remove it, or state teeth: true")
+_TEETH = OnlyWith("teeth")
 
 
 class Gear(Part):
@@ -371,7 +357,7 @@ class Gear(Part):
     lead: Annotated[Length | None, NotZero("the nut would not move at all")] = None
     phase: AngleOrLength = Quantity(0, KINDS["angle"])
     teeth: bool = True
-    pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)", "20 deg is usual"), _TEETH] = None
+    pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)"), _TEETH] = None
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""

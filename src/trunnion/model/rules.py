@@ -21,61 +21,53 @@ from trunnion.model.names import nearest
 from trunnion.model.units import KINDS, Kind
 
 __all__ = [
-    "Directed",
-    "NotNegative",
-    "NotZero",
-    "Positive",
-    "Rising",
-    "Within",
-    "group_findings",
-    "limit_findings",
-    "markers",
-    "stated_wrongly",
-]
+    "Directed", "InSpace", "NotNegative", "NotZero", "OnlyWith", "Positive", "Refers", "Rising", "Selects", "Within",
+    "faults", "group_findings", "key_findings", "limit_findings", "markers", "stray",
+]  # fmt: skip
 
 ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than it
 Values = Mapping[str, Number]
+Model = Any  # a `Fields`, which stands above: it has `coordinates`, how many a point has, and `named`
 
 
 class Rule:
     """A marker of a field."""
 
 
-# ---- of one number --------------------------------------------------------------------------------------------
+def faults(where: str, *rows: tuple[Any, ...]) -> Iterator[Finding]:
+    """Findings of the rows whose first is true.
+
+    A row is: whether something is wrong, with which key of the part at `where` (none if empty), what, and what to do
+    about it where that is not plain.
+    """
+    for wrong, key, what, *remedy in rows:
+        if wrong:
+            yield Finding(what, f"{where}.{key}".strip("."), *remedy)
+
+
+# ---- of numbers -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Within(Rule):
-    """A number between two limits, SI. A limit with a round bracket in `ends` is itself outside.
-
-    remedy: what to do about a number outside, where the limits alone do not say it.
-    """
+    """A number between two limits, SI. A limit with a round bracket in `ends` is itself outside."""
 
     low: float = -math.inf
     high: float = math.inf
     ends: str = "[]"
-    remedy: str = ""
 
     def what(self, value: float, kind: Kind) -> str:
         """What is wrong with a number; empty if nothing is, nan among it."""
-        slack = [ROUNDING * abs(end) if math.isfinite(end) else 0.0 for end in (self.low, self.high)]
-        below = value <= self.low if self.ends[0] == "(" else value < self.low - slack[0]
-        above = value >= self.high if self.ends[1] == ")" else value > self.high + slack[1]
+        below = value <= self.low if self.ends[0] == "(" else value < self.low - ROUNDING * abs(self.low)
+        above = value >= self.high if self.ends[1] == ")" else value > self.high + ROUNDING * abs(self.high)
         if not (below or above):
             return ""
-        negative = self.low == 0 and self.ends[0] == "[" and below
-        return f"is {_with_unit(value, kind)}, which is {'negative' if negative else f'not {self.limits(kind)}'}"
-
-    def limits(self, kind: Kind) -> str:
-        """The limits in words: `at least 0`, `above 0 and at most 1`."""
+        if below and self.low == 0 and self.ends[0] == "[":
+            return f"is {_with_unit(value, kind)}, which is negative"
         low = f"{'above' if self.ends[0] == '(' else 'at least'} {_with_unit(self.low, kind) if self.low else 0}"
         high = f"{'below' if self.ends[1] == ')' else 'at most'} {_with_unit(self.high, kind)}"
-        return " and ".join(text for text, end in ((low, self.low), (high, self.high)) if math.isfinite(end))
-
-    def instead(self, kind: Kind) -> str:
-        """What to do about a number outside."""
-        of = "" if self.ends[0] == "(" else "of "
-        return f"give a value {of}{self.limits(kind)}" + f"; {self.remedy}" * bool(self.remedy)
+        limits = [text for text, end in ((low, self.low), (high, self.high)) if math.isfinite(end)]
+        return f"is {_with_unit(value, kind)}, which is not {' and '.join(limits)}"
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """The limits of a plain number, beside its form."""
@@ -91,15 +83,10 @@ class NotZero(Rule):
     """A number other than 0, which would mean something."""
 
     meaning: str
-    remedy: str = "give another value"
 
     def what(self, value: float, kind: Kind) -> str:
         """What is wrong with a number; empty if nothing is."""
         return f"is 0: {self.meaning}" if value == 0 else ""
-
-    def instead(self, kind: Kind) -> str:
-        """What to do about a 0."""
-        return self.remedy
 
 
 NotNegative = Within(0.0)
@@ -110,18 +97,15 @@ def _with_unit(value: float, kind: Kind) -> str:
     """A number with its unit, an angle in degrees."""
     if kind is KINDS["angle"]:
         return f"{math.degrees(value):.4g} deg"
-    one_unit = len(kind.dimensions) == 1 and kind.unit != "1"
-    return f"{value:g} {kind.unit}" if one_unit else f"{value:g}"
+    single = len(kind.dimensions) == 1 and kind.unit != "1"
+    return f"{value:g} {kind.unit}" if single else f"{value:g}"
 
 
 def limit_findings(rules: tuple[Any, ...], value: float, kind: Kind, where: str) -> Iterator[Finding]:
     """Findings about a number that its rules exclude."""
     for rule in rules:
         if isinstance(rule, Within | NotZero) and (what := rule.what(value, kind)):
-            yield Finding(what, where, rule.instead(kind))
-
-
-# ---- of several numbers ---------------------------------------------------------------------------------------
+            yield Finding(what, where)
 
 
 @dataclass(frozen=True)
@@ -132,8 +116,7 @@ class Directed(Rule):
         """A finding where all are 0. path: of the field."""
         components = [values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in values]
         if components and not any(components):
-            example = ", ".join(("1", "0", "0")[: len(components)])
-            yield Finding("has no direction: all its components are 0", path, f"write [{example}] for along x")
+            yield Finding("has no direction: all its components are 0", path)
 
 
 @dataclass(frozen=True)
@@ -148,23 +131,17 @@ class Rising(Rule):
         while (here := values.get(f"{path}.{k}.{self.column}")) is not None:
             if here <= before:
                 what = f"its {self.column} {here:g} does not come after {before:g} of the point before (SI)"
-                yield Finding(what, f"{path}.{k}", f"sort the points by {self.column}; make a jump steep, not upright")
+                yield Finding(what, f"{path}.{k}", "make a jump steep, not upright")
             k, before = k + 1, here
 
 
 def group_findings(path: str, part: BaseModel, values: Values) -> Iterator[Finding]:
     """Findings about fields of several numbers, of a part and of what is in it."""
-    for where, below in parts(path, part):
-        for key, rules in markers(type(below)).items():
-            for rule in rules:
-                if isinstance(rule, Directed | Rising) and getattr(below, key) is not None:
-                    yield from rule.check(f"{where}.{key}", values)
+    for where, _, key, rule in _ruled(path, part, Directed | Rising):
+        yield from rule.check(f"{where}.{key}", values)
 
 
 # ---- of names and keys ----------------------------------------------------------------------------------------
-
-
-Model = Any  # a `Fields`, which stands above: it has `coordinates`, how many a point has, and `named`
 
 
 @dataclass(frozen=True)
@@ -176,21 +153,18 @@ class Refers(Rule):
 
     def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """Findings about names that mean nothing. where: the part stands."""
-        value = getattr(part, key)
-        names, at = (value,) if isinstance(value, str) else value, f"{where}.{key}".lstrip(".")
+        value, at = getattr(part, key), f"{where}.{key}".lstrip(".")
+        names = (value,) if isinstance(value, str) else value
         for name in dict.fromkeys(names):
             yield from self.missing(name, at, model)
             if self.distinct and names.count(name) > 1:
-                yield Finding(
-                    f"names the {self.noun.removeprefix('any ')} '{name}' twice", at, "name two different ones"
-                )
+                yield Finding(f"names the {self.noun.removeprefix('any ')} '{name}' twice", at)
 
     def missing(self, name: str, where: str, model: Model) -> Iterator[Finding]:
         """A finding if there is no part of this name."""
         if name not in (names := model.named(self.noun)):
             form = " (write link.point)" if self.noun == "point" else ""
-            what = f"there is no {self.noun.removeprefix('any ')} '{name}'"
-            yield Finding(what, where, nearest(name, names) + form)
+            yield Finding(f"there is no {self.noun.removeprefix('any ')} '{name}'", where, nearest(name, names) + form)
 
 
 @dataclass(frozen=True)
@@ -211,29 +185,27 @@ class InSpace(Rule):
 
 @dataclass(frozen=True)
 class OnlyWith(Rule):
-    """A key that has an effect only beside another. remedy: how to state that; words: what it is."""
+    """A key that has an effect only beside another. words: what that is, where its name does not tell."""
 
     key: str
-    remedy: str
     words: str = ""
 
     def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """A finding if the other is not stated."""
         if key in part.model_fields_set and not getattr(part, self.key):
-            yield Finding(f"has no effect without {self.words or self.key}", f"{where}.{key}", self.remedy)
+            yield Finding(f"has no effect without {self.words or self.key}", f"{where}.{key}")
 
 
 @dataclass(frozen=True, eq=False)
 class Selects(Rule):
     """A word that says which other keys of its part are needed, and which have an effect.
 
-    table: by word, with `needs` and `takes`; also: keys beside any word; examples: of what is needed, by key; instead:
-    the key that may stand for one that is needed.
+    table: by word, with `needs` and `takes`; also: keys beside any word; instead: the key that may stand for one that
+    is needed.
     """
 
     noun: str
     table: Mapping[str, Any]
-    examples: Mapping[str, str]
     also: tuple[str, ...] = ()
     instead: Mapping[str, str] = field(default_factory=dict)
 
@@ -245,8 +217,8 @@ class Selects(Rule):
         yield from stray(keys, takes, key, word, self.noun, where)
         for need in self.table[word].needs:
             if getattr(part, need) is None and need not in keys:
-                example = f"add {need}: {self.examples[need]}"
-                yield Finding(f"'{need}' is missing", where, f"{example}, or state {key}: {' or '.join(self.table)}")
+                either = " or ".join([need, *(other for other, needed in self.instead.items() if needed == need)])
+                yield Finding(f"'{need}' is missing", where, f"add {either}, or state {key}: {' or '.join(self.table)}")
 
 
 def stray(
@@ -263,17 +235,9 @@ def stray(
 def key_findings(model: Any) -> Iterator[Finding]:
     """Findings about names and keys, of every part of a model: its joints with their defaults."""
     sections = {key: getattr(model, key) for key in type(model).model_fields if key not in ("joints", "loop")}
-    every: list[tuple[str, BaseModel]] = [("", model), *parts("", {**sections, "joints": model.effective_joints})]
-    for where, part in every:
-        for key, rules in markers(type(part)).items():
-            for rule in rules:
-                if isinstance(rule, Refers | InSpace | OnlyWith | Selects) and getattr(part, key) is not None:
-                    yield from rule.findings(key, part, where, model)
-
-
-def stated_wrongly(*rows: tuple[bool, str, str, str]) -> Iterator[Finding]:
-    """Findings of the rows whose first is true: what is wrong, where, and what to do about it."""
-    yield from (Finding(what, where, remedy) for wrong, what, where, remedy in rows if wrong)
+    every = {**sections, "joints": model.effective_joints}
+    for where, part, key, rule in _ruled("", model, Refers | InSpace | OnlyWith | Selects, every):
+        yield from rule.findings(key, part, where, model)
 
 
 # ---- where rules stand ----------------------------------------------------------------------------------------
@@ -296,13 +260,19 @@ def _marked(annotation: Any) -> Iterator[Any]:
             yield from _marked(form)
 
 
-def parts(path: str, value: object) -> Iterator[tuple[str, BaseModel]]:
-    """A part of the model and every part in it, with their paths."""
+def _ruled(
+    path: str, value: object, kinds: Any, below: Mapping[str, object] | None = None
+) -> Iterator[tuple[str, BaseModel, str, Any]]:
+    """The fields with rules of some kinds that state something, of a part and of every part in it.
+
+    Where the part stands, the part, the key and the rule. below: what is in it, if not what its fields hold.
+    """
     if isinstance(value, BaseModel):
-        yield path, value
-        below: Mapping[str, object] = {key: getattr(value, key) for key in type(value).model_fields}
-    else:
-        below = value if isinstance(value, Mapping) else {}
-    for key, item in below.items():
+        for key, rules in markers(type(value)).items():
+            for rule in rules:
+                if isinstance(rule, kinds) and getattr(value, key) is not None:
+                    yield path, value, key, rule
+        below = below or {key: getattr(value, key) for key in type(value).model_fields}
+    for key, item in (below or (value if isinstance(value, Mapping) else {})).items():
         if isinstance(item, BaseModel | Mapping):
-            yield from parts(f"{path}.{key}".lstrip("."), item)
+            yield from _ruled(f"{path}.{key}".lstrip("."), item, kinds)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
     BeforeValidator,
@@ -22,7 +22,7 @@ from trunnion.joints.fits import GRADES
 from trunnion.model.entry import Name, Part, known, problem
 from trunnion.model.limits import Limits, LimitText
 from trunnion.model.quantity import AnyQuantity, Dimensionless
-from trunnion.model.rules import NotNegative, Positive, Refers, Within
+from trunnion.model.rules import NotNegative, Positive, Refers, Selects, Within
 
 __all__ = [
     "COST_MODELS",
@@ -108,9 +108,16 @@ class Correlation(Part):
     coefficient: Annotated[Dimensionless, Within(-1, 1)]
 
 
-COST_MODELS = ("power", "exponential")
+class FormulaKeys(NamedTuple):
+    """What a formula of costs needs and takes."""
 
-_check_model, _schema_model = known(COST_MODELS, "cost model")
+    needs: tuple[str, ...] = ("B", "k")
+    takes: tuple[str, ...] = ("A", "unit", "least", "most")
+
+
+COST_MODELS = {"power": FormulaKeys(), "exponential": FormulaKeys()}
+
+_check_model, _schema_model = known(tuple(COST_MODELS), "cost model")
 
 
 def _grade(value: object) -> object:
@@ -132,6 +139,9 @@ class CostOption(Part):
     cost: Dimensionless
 
 
+_FORMULA = Selects("cost model", COST_MODELS, ("group", "process", "options"))
+
+
 class Cost(Part):
     """What a tolerance costs, by its half width t; of the play of a joint, by the clearance.
 
@@ -139,10 +149,10 @@ class Cost(Part):
     among the IT grades of a process; and `options`, a choice among ways to make it.
     """
 
-    model: Annotated[str, _check_model, _schema_model] | None = None
+    model: Annotated[str, _check_model, _schema_model, _FORMULA] | None = None
     A: Dimensionless | None = None
-    B: Annotated[Dimensionless | None, Within(0, remedy="a wider tolerance would cost more")] = None
-    k: Annotated[Dimensionless | None, Within(0, ends="(]", remedy="a wider tolerance would cost more")] = None
+    B: Annotated[Dimensionless | None, NotNegative] = None
+    k: Annotated[Dimensionless | None, Positive] = None
     unit: str | None = None
     least: Annotated[AnyQuantity | None, NotNegative] = None
     most: Annotated[AnyQuantity | None, Positive] = None

@@ -7,30 +7,43 @@ it can be assembled) is checked where the structure is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
+from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.checks.drivers import driver_findings, gears
-from trunnion.model.checks.forgotten_units import forgotten_units, plain_angles, thousands
-from trunnion.model.checks.joints import joint_findings
-from trunnion.model.checks.loads import expression_name, load_findings, motion_dimensions, springs, tables, unknown_name
-from trunnion.model.checks.loops import coordinates, loop
-from trunnion.model.checks.measures import check_measure
+from trunnion.model.checks.joints import joint_findings, joint_values
+from trunnion.model.checks.loads import (
+    expression_name,
+    load_findings,
+    motion_dimensions,
+    spring_values,
+    springs,
+    table_values,
+    tables,
+    unknown_name,
+)
+from trunnion.model.checks.measures import check_measure, measure_values
+from trunnion.model.checks.motion import driver_findings, driver_values, gear_values, gears, loop
 from trunnion.model.checks.tolerances import cost_values, meant, tolerance_names, tolerance_values
-from trunnion.model.checks.values import check_values
-from trunnion.model.joint_parts import motions
+from trunnion.model.checks.units import forgotten_units, plain_angles, thousands
+from trunnion.model.joint_parts import has_pin, motions
 from trunnion.model.names import ERRORS, nearest
-from trunnion.model.parameters import Entry, Numbers, dimension_errors
-from trunnion.model.parts import AT
+from trunnion.model.parameters import Entry, Numbers, ParameterSet, dimension_errors
+from trunnion.model.parts import AT, InertiaTensor, Link
 from trunnion.model.quantity import evaluation_order
-from trunnion.model.rules import InSpace, Refers, key_findings
+from trunnion.model.rules import InSpace, Refers, faults, group_findings, key_findings, limit_findings
 from trunnion.model.tolerances import ends_motion, further_entries
 from trunnion.model.units import ANY, Dimension, UnitError
 
-__all__ = ["check_model"]
+__all__ = ["check_model", "check_values"]
+
+Values = Mapping[str, Number]
+# of the largest moment, by which a flat body may violate the triangle inequality: of four digits, of three or two
+INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2
+ALONG = 1e-6  # sine of the angle below which `x` lies along `axis`: what is left of it across is rounding of the file
 
 
 def check_model(mechanism: Numbers) -> list[Finding]:
@@ -54,31 +67,19 @@ def _references(mechanism: Numbers) -> Iterator[Finding]:
     yield from loop(mechanism)
     yield from key_findings(mechanism)
     for name in mechanism.drivers:
-        if name not in mechanism.effective_joints:
-            remedy = nearest(name, mechanism.effective_joints)
-            yield Finding(f"there is no joint '{name}' to drive", f"drivers.{name}", remedy)
+        yield from Refers("any joint").missing(name, f"drivers.{name}", mechanism)
     for name, hint in mechanism.assembly.items():
         link, _, point = name.partition(".")
-        missing = point and point not in mechanism.points.get(link, ())
-        if (
-            name not in mechanism.effective_joints
-            and name != AT
-            and not isinstance(hint, str)
-            and (missing or not point)
-        ):
+        placed = point in mechanism.points.get(link, ()) or name in mechanism.effective_joints or name == AT
+        if not placed and not isinstance(hint, str):
             yield from Refers("point" if point else "any joint").missing(name, f"assembly.{name}", mechanism)
-        if isinstance(hint, tuple):
-            yield from InSpace().counted(hint, f"assembly.{name}", mechanism)
+        yield from InSpace().counted(hint, f"assembly.{name}", mechanism)
     for name, measure in mechanism.measures.items():
         yield from check_measure(mechanism, measure, f"measures.{name}")
 
 
 def _together(mechanism: Numbers) -> Iterator[Finding]:
     """Whether the parts go together, each by itself and in its place, and the units of every expression."""
-    if not mechanism.links and not mechanism.loop:
-        yield Finding("there are no links", "links", "state at least a ground and a moving link")
-    elif not mechanism.effective_joints:
-        yield Finding("there are no joints", "joints", "join the links")
     yield from _quantities(mechanism)
     yield from _links(mechanism)
     yield from joint_findings(mechanism)
@@ -91,12 +92,13 @@ def _together(mechanism: Numbers) -> Iterator[Finding]:
     yield from findings
     varying = {entry.path for entry in mechanism.entries if entry.varies}
     for name, path in paths.items():
-        if path.startswith("drivers."):
-            what = "an error of a driver changes the times of the cycle, so there is no ideal cycle to compare with"
-            yield Finding(what, f"{ERRORS}{name}", "change the driver itself")
-        if path in varying:
-            what = f"'{path}' varies with the motion and has no one error"
-            yield Finding(what, f"{ERRORS}{name}", "state one of a dimension in it")
+        yield from faults(
+            f"{ERRORS}{name}",
+            (path.startswith("drivers."), "",
+             "an error of a driver changes the times of the cycle, so there is no ideal cycle to compare with"),
+            (path in varying, "", f"'{path}' varies with the motion and has no one error",
+             "state one of a dimension in it"),
+        )  # fmt: skip
     yield from tolerance_names(mechanism)
 
 
@@ -127,9 +129,8 @@ def _quantities(mechanism: Numbers) -> Iterator[Finding]:
         for name in missing:
             yield unknown_name(mechanism, name, entry.where, quantity.source, dimensions)
         if quantity.tolerance and (entry.varies or ends_motion(entry.path)):
-            what = f"'{quantity.source}' has a tolerance, and does not vary: it is where the motion is compared at"
-            what = f"'{quantity.source}' varies with the motion and has a tolerance" if entry.varies else what
-            yield Finding(what, entry.where, "state a dimension with the tolerance, or put it into a link")
+            why = "varies with the motion" if entry.varies else "does not vary: the motion is compared there"
+            yield Finding(f"'{quantity.source}' has a tolerance, and {why}", entry.where)
         if not missing and entry.path.partition(".")[0] != "dimensions":
             try:
                 yield from thousands(entry.where, quantity, quantity.check(sayable, entry.kind))
@@ -154,49 +155,186 @@ def _dimensions(mechanism: Numbers, by_name: dict[str, Dimension | None]) -> Ite
         ring = " → ".join([*circle, circle[0]])
         yield Finding(f"is defined by itself: {ring}", f"dimensions.{circle[0]}", "give one of them a value")
     for name in order:
-        yield from expression_name(name, f"dimensions.{name}")
-        quantity = dimensions[name]
+        where, quantity = f"dimensions.{name}", dimensions[name]
+        yield from expression_name(name, where)
         if set(quantity.names) <= by_name.keys():
             try:
                 by_name[name] = quantity.check(by_name, ANY)
-                yield from thousands(f"dimensions.{name}", quantity, by_name[name])
+                yield from thousands(where, quantity, by_name[name])
             except UnitError as error:
-                yield Finding(error.what, f"dimensions.{name}", error.remedy)
+                yield Finding(error.what, where, error.remedy)
 
 
 # ---- links and hints ------------------------------------------------------------------------------------------
 
 
 def _links(mechanism: Numbers) -> Iterator[Finding]:
-    """Whether one link is fixed, each is joined to another, and what it states is of the space."""
+    """Whether there are links and joints, one link is fixed, and each is joined to another."""
     jointed = {name for joint in mechanism.effective_joints.values() for name in joint.links}
-    if not mechanism.fixed_link:
-        remedy = "name the fixed link 'ground' or 'frame', or state ground: <its name>"
-        yield Finding("no link is fixed", "ground", remedy)
+    no_links = not mechanism.effective_links
+    remedy = "name the fixed link 'ground' or 'frame', or state ground: <its name>"
+    yield from faults(
+        "",
+        (no_links, "links", "there are no links", "state at least a ground and a moving link"),
+        (not no_links and not jointed, "joints", "there are no joints", "join the links"),
+        (not mechanism.fixed_link, "ground", "no link is fixed", remedy),
+    )
     for name, link in mechanism.links.items():
         where = f"links.{name}"
         if name not in jointed:
             yield Finding(f"no joint connects the link '{name}'", where, "join it to another link or remove it")
-        if link.inertia_about == "origin" and not link.model_fields_set & {"inertia"}:
-            yield Finding("inertia_about is given without an inertia", where, "give the inertia", Severity.WARNING)
+        if link.inertia_about == "origin" and "inertia" not in link.model_fields_set:
+            yield Finding("inertia_about is given without an inertia", where, "", Severity.WARNING)
 
 
 def _hints(mechanism: Numbers) -> Iterator[Finding]:
     """Whether each hint of the assembly is of something that it can place."""
-    joints, points = mechanism.effective_joints, mechanism.points
+    moving = [link for link in mechanism.points if link != mechanism.fixed_link]
     for name, hint in mechanism.assembly.items():
-        where, joint = f"assembly.{name}", joints.get(name)
+        where, joint = f"assembly.{name}", mechanism.effective_joints.get(name)
+        pair, position = PAIRS[joint.type] if joint else None, isinstance(hint, tuple)
         if isinstance(hint, str):
-            moving = [link for link in points if link != mechanism.fixed_link]
             if name not in moving:
                 what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
                 yield Finding(what, where, nearest(name, moving))
         elif name == AT and joint is None:
-            if isinstance(hint, tuple) or not mechanism.drivers:
+            if position or not mechanism.drivers:
                 what = "it says where the driver is when points are where the hints say"
                 yield Finding(what, where, "write its coordinate, as at: 30 deg" if mechanism.drivers else "remove it")
-        elif "." in name and not isinstance(hint, tuple):
-            yield Finding("a point has a position, not an angle", where, f"write {coordinates(mechanism)}")
-        elif joint and not isinstance(hint, tuple) and not (motions(joint.type) or PAIRS[joint.type].crossed):
+        elif "." in name and not position:
+            yield Finding("a point has a position, not an angle", where, f"write {mechanism.position_form}")
+        elif joint and pair and not position and not (motions(joint.type) or pair.crossed):
             what = f"one number does not state how far a {joint.type} joint has moved"
-            yield Finding(what, where, f"state where it is: {coordinates(mechanism)}")
+            yield Finding(what, where, f"state where it is: {mechanism.position_form}")
+
+
+# ---- numbers --------------------------------------------------------------------------------------------------
+
+
+def check_values(
+    mechanism: Numbers, numbers: ParameterSet, changed: Collection[str] | None = None
+) -> Iterator[Finding]:
+    """Findings about the nominal values of a model whose names and units are sound.
+
+    changed: paths of those that differ from the numbers of a sound mechanism, all if not given: errors that follow from
+    no other number are found, and of warnings some.
+    """
+    values = numbers.nominal
+    every = {(section, name) for section in ("links", "drivers", "tables", "measures")
+             for name in getattr(mechanism, section)}  # fmt: skip
+    every |= {("joints", name) for name in mechanism.effective_joints}
+    touched = every if changed is None else {tuple(path.split(".", 2)[:2]) for path in changed}
+    sections = {section for section, *_ in touched}
+    for path in numbers.entries if changed is None else changed:
+        yield from _alone(numbers, path)
+    for section in ("links", "drivers", "tables", "measures", "joints"):
+        entries = mechanism.effective_joints if section == "joints" else getattr(mechanism, section)
+        for name in (name for name in entries if (section, name) in touched):
+            yield from group_findings(f"{section}.{name}", entries[name], values)
+            if section == "links":
+                yield from _mass(mechanism, mechanism.links[name], values, f"links.{name}")
+            elif section == "joints":
+                yield from joint_values(mechanism, name, numbers)
+            elif section == "drivers":
+                yield from driver_values(mechanism, name, values)
+    yield from _unfollowed(numbers) if changed is None else ()
+    yield from gear_values(mechanism, values)
+    if not sections.isdisjoint(("tables", "drivers")):
+        yield from table_values(mechanism, values)
+    yield from spring_values(mechanism, values)
+    if "links" in sections:
+        yield from _sides(mechanism, values)
+    if "measures" in sections:
+        yield from measure_values(mechanism, numbers)
+
+
+def _alone(numbers: ParameterSet, path: str) -> Iterator[Finding]:
+    """What can be said of a number by itself."""
+    values = numbers.nominal
+    if path not in values:  # an expression of the motion
+        return
+    entry = numbers.entries[path]
+    follows = any(not np.isfinite(values[name]) for name in entry.depends if name in values)
+    if entry.quantity.names and not follows and not np.isfinite(values[path]):
+        what = f"'{entry.quantity.source}' has no finite value ({values[path]})"
+        yield Finding(what, entry.where, "check divisions and roots")
+    if not entry.alias:
+        yield from limit_findings(entry.rules, values[path], entry.kind, path)
+
+
+def _unfollowed(numbers: ParameterSet) -> Iterator[Finding]:
+    """Defaults without effect, as a clearance of pins that all have a fit."""
+    followed = {entry.alias for entry in numbers.entries.values()}
+    for path in numbers.entries:
+        if path.startswith("joint_defaults.") and path not in followed:
+            yield Finding("has no effect: no joint follows it", path, "remove it", Severity.NOTE)
+
+
+def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
+    """A link of two turning joints at one point has no length; a direction x along the axis counts no rotation."""
+    spatial = mechanism.space == "spatial"
+    geared = {joint for gear in mechanism.gears.values() for joint in gear.joints}  # a shaft with two passes on torque
+    for name, link in mechanism.links.items():
+        for point, place in link.points.items() if spatial else ():
+            path = f"links.{name}.points.{point}"
+            if place.x is not None:
+                x = [float(values[f"{path}.x.{letter}"]) for letter in "xyz"]
+                axis = [float(values[f"{path}.axis.{letter}"]) for letter in "xyz"] if place.axis else [0.0, 0.0, 1.0]
+                across, size = np.linalg.norm(np.cross(axis, x)), np.linalg.norm(axis) * np.linalg.norm(x)
+                if size > 0 and across <= ALONG * size:
+                    what = "lies along the axis" + " [0, 0, 1]" * (place.axis is None)
+                    yield Finding(what, f"{path}.x", "give a direction across the axis, or none")
+        ends = {key: joint for key, joint in mechanism.effective_joints.items()
+                if name in joint.links and key in link.points}  # fmt: skip
+        turn = all(has_pin(joint.type) for joint in ends.values())
+        if spatial or len(ends) != 2 or not turn or not geared.isdisjoint(ends):
+            continue
+        first, second = ([values[f"links.{name}.points.{key}.{axis}"] for axis in "xy"] for key in ends)
+        if first == second:
+            severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
+            what = f"the joints {' and '.join(map(repr, ends))} of the link '{name}' are at one point"
+            yield Finding(what, f"links.{name}.points", "move one of them", severity)
+
+
+def _mass(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
+    """Whether a body can be so: principal moments about its centre, each at most the sum of the others."""
+    mass, letters = values[f"{where}.mass"], "xyz"[: mechanism.coordinates]
+    gravity = [values.get(f"gravity.{axis}", np.nan) for axis in letters]
+    if link.useful and (mass == 0 or not np.any(gravity)):
+        yield Finding("has no weight that could be useful", f"{where}.useful", "state mass and gravity, or remove it")
+    centre = np.array([float(values.get(f"{where}.centre.{axis}", np.nan)) for axis in letters])
+    if np.isnan(centre).all():
+        distance, angle = values[f"{where}.centre.distance"], values[f"{where}.centre.angle"]
+        centre = distance * np.array([np.cos(angle), np.sin(angle)])
+    path, about_origin = f"{where}.inertia", link.inertia_about == "origin"
+    tensor_stated = isinstance(link.inertia, InertiaTensor)
+    if tensor_stated != (mechanism.space == "spatial") and "inertia" in link.model_fields_set:
+        form = "{xx: …, yy: …, zz: …}" if mechanism.space == "spatial" else "one number"
+        yield Finding(f"the inertia of a {mechanism.space} link is {form}", path)
+    elif not tensor_stated:
+        least = mass * float(centre @ centre) if about_origin else 0.0
+        if values.get(path, np.inf) < least * (1 - INERTIA_SLACK):  # a spatial link without a tensor is a point mass
+            what = f"is {values[path]:g} kg m², less than m r² = {least:g}" if least else "is negative"
+            yield Finding(what, path, "check unit and inertia_about")
+    else:
+        xx, yy, zz, xy, xz, yz = (float(values[f"{path}.{axis}"]) for axis in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if about_origin:
+            tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        if np.isfinite(tensor).all():
+            yield from _triangle(tensor, path)
+
+
+def _triangle(tensor: np.ndarray[tuple[int, ...], np.dtype[np.float64]], path: str) -> Iterator[Finding]:
+    """Whether a body can have a tensor of inertia about its centre."""
+    principal, size = np.linalg.eigvalsh(tensor), float(np.abs(tensor).max())
+    excess = principal[2] - principal[0] - principal[1]
+    if principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_SLACK * size:
+        return
+    rounded = principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_ROUNDING * size
+    moments = ", ".join(f"{axis:.4g}" for axis in principal)
+    what = f"no body has the principal moments {moments} kg m² about its centre: one exceeds the sum of the others"
+    remedy = "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)"
+    if rounded:
+        what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"
+    yield Finding(what, path, remedy, Severity.WARNING if rounded else Severity.ERROR)

@@ -27,7 +27,7 @@ from trunnion.cycle.positions import check_steps, positions
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.many import figures_of
-from trunnion.model.checks.values import check_values
+from trunnion.model.checks.check import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
 from trunnion.solve import change_points

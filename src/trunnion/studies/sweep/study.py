@@ -22,7 +22,7 @@ from trunnion.errors import Finding, Severity, Status, agreeing, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.checks.forgotten_units import bare_number
+from trunnion.model.checks.units import bare_number
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described

@@ -20,7 +20,7 @@ from trunnion.cycle.model_findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
-from trunnion.model.checks.values import check_values
+from trunnion.model.checks.check import check_values
 from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure

@@ -97,7 +97,7 @@ BAD_FILES = [
     ("- 1\n- 2\n", 1, "not a group of entries", "examples"), ("hello", 1, "not a group of entries", "examples"),
     (b"\xff\xfe\x00\x01", 1, "is not UTF-8 text (byte 0)", "UTF-8"),
     (b"trunnion: 1\nname: caf\xe9\n", 2, "is not UTF-8 text (byte 21)", "UTF-8"),
-    (b"\x00\x01\x02\x03" * 100, None, "is not YAML", "text file"),
+    (b"\x00\x01\x02\x03" * 100, None, "is not YAML", "check"),
     ("trunnion: 1\nlinks: [1, 2\njoints: 3\n", 3, "is not YAML", "brackets"),
     ("trunnion: 1\n  links: 2\n", 2, "is not YAML: mapping values are not allowed here (column 8)", "indentation"),
     ("trunnion: 1\n\tlinks: 2\n", 2, "is not YAML", "indentation"),

@@ -365,27 +365,6 @@ def test_moments_of_inertia_that_were_rounded(tmp_path: Path, moments: str, seve
     assert found.get("links.rod.inertia") == severity
 
 
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        ("force: [0, -1 kN]", "force: [0, -1 kN * between(drive, 10 deg, 20 deg) * 2]"),
-        ("force: [0, -1 kN]", "force: [min(1 N, 2 N), max(3 N, 4 N)]"),
-        ("force: [0, -1 kN]", "force: [0, 0], moment: 1 N m * between(drive, 10 deg, 20 deg)"),
-    ],
-)
-def test_a_value_that_is_cut_at_its_comma(before: str, after: str, findings_of: FindingsOf, tmp_path: Path) -> None:
-    """In brackets and in braces: the finding shows the value in quotation marks, and so the file can be read."""
-    whole = DURANGO.read_text("utf-8")
-    text = whole[: whole.index("loads:")] + "loads:\n  push: {link: coupler, at: C, force: [0, -1 kN]}\n"
-    text = text.replace(before, after)
-    for finding in findings_of(text):
-        quoted = finding.remedy.partition("marks: ")[2]
-        assert quoted
-        text = text.replace(quoted.strip('"'), quoted)
-    (tmp_path / "mended.yaml").write_text(text, encoding="utf-8")
-    assert read_mechanism(tmp_path / "mended.yaml")
-
-
 @pytest.mark.parametrize("name", ["pin 1", "left: pin", "a, b", "#1", "[x]", "{x}", "no", "12", "it's", '"big"', "& γ"])
 def test_a_name_that_advice_puts_into_a_file_is_a_key_of_it(name: str) -> None:
     load = YAML(typ="safe", pure=True).load

@@ -79,7 +79,7 @@ assembly: {B: [0.02, 0.02]}
     [
         ("", "", None, "", ""),  # a plain factor and a plain hint
         ("range: [70 mm, 90 mm]", "range: [70 mm, 90]", Severity.WARNING, "drivers.S.range.to", "is 90 m, "),
-        ("pinch: 1 mm", "pinch: 1", Severity.WARNING, "dimensions.pinch", "5.56 times the largest length"),
+        ("pinch: 1 mm", "pinch: 1", Severity.WARNING, "dimensions.pinch", "6 times the largest length"),
         ("pinch: 1 mm", "pinch: 0.001", None, "", ""),
         ("radius: 6 mm", "radius: 0.006", None, "", ""),
     ],

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.parser import Parser
@@ -93,22 +93,21 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
 
     sections: those of the model to which this is limited; all if there is none.
     """
-    path, findings = Path(path), list(findings)
+    path, findings, only = Path(path), list(findings), set(sections)
     if not findings:
         return []
-    only = set(sections)
     text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
     data, lines = entries_of(text, _file_type(path))
     rows = _rows(data)
-    placed_findings: list[Finding] = []
-    for finding in findings:
+
+    def stands(finding: Finding) -> bool:
         section, *names = finding.where.split(".")
         entry = ".".join([section, *names[:1]])
         present = entry in rows or (section in data and entry in lines)
-        if present and not finding.file and (not only or section in only):
-            finding = finding.at(str(path), _line(finding.where, lines, rows))
-        placed_findings.append(finding)
-    return placed_findings
+        return present and not finding.file and (not only or section in only)
+
+    return [finding.at(str(path), _line(finding.where, lines, rows)) if stands(finding) else finding
+            for finding in findings]  # fmt: skip
 
 
 def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
@@ -151,78 +150,53 @@ def version_findings(data: Mapping[str, Any]) -> list[Finding]:
 def _file_type(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in _TYPES:
-        raise MechanismError(
-            Finding(
-                f"the extension '{suffix}' is not one of a model file",
-                file=str(path),
-                remedy=f"use {', '.join(_TYPES)}",
-            )
-        )
+        what, remedy = f"the extension '{suffix}' is not one of a model file", f"use {', '.join(_TYPES)}"
+        raise MechanismError(Finding(what, file=str(path), remedy=remedy))
     return _TYPES[suffix]
 
 
 def entries_of(text: str, kind: str = "YAML") -> tuple[dict[str, Any], Lines]:
     """Plain data of a text in YAML, JSON or TOML, and the line of every path in it; MechanismError if it is none."""
     try:
-        return _parse_toml(text) if kind == "TOML" else _parse_yaml(text, kind)
-    except RecursionError:
-        raise MechanismError(Finding("is nested too deeply", remedy="check brackets")) from None
-
-
-def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
-    if deep := _DEEP_KEY.search(text):  # tomllib takes a time with the square of the dots
-        at = text.count("\n", 0, deep.start()) + 1
-        raise MechanismError(Finding("is nested too deeply", remedy="check the dots in the key", line=at))
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        match = re.search(r"at line (\d+), column \d+", str(error))
-        raise MechanismError(
-            Finding(f"is not TOML: {error}", remedy="correct it there", line=int(match[1]) if match else None)
-        ) from error
-    except ValueError as error:  # of a whole number that Python does not read
-        raise MechanismError(Finding(f"is not TOML: {error}", remedy="write a number as 1.25e1")) from error
-    if _depth(data) > MAX_DEPTH:
-        raise MechanismError(Finding("is nested too deeply", remedy="check brackets and the dots in keys"))
-    return data, {}  # tomllib keeps no lines
-
-
-def _depth(data: Any) -> int:
-    """How deeply groups and lists are nested."""
-    depth, layer = 0, [data]
-    while layer:
-        depth += 1
-        groups = (node.values() if isinstance(node, dict) else node for node in layer)
-        layer = [node for group in groups for node in group if isinstance(node, (dict, list))]
-    return depth
-
-
-def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
-    if kind == "JSON":
-        text = text.replace("\t", " ")  # allowed between the tokens of JSON, not of YAML
-    try:
-        root = composed(text)
+        if kind == "TOML":
+            return _parse_toml(text), {}  # tomllib keeps no lines
+        root = composed(text.replace("\t", " ") if kind == "JSON" else text)  # a tab is allowed in JSON, not in YAML
     except MechanismError:
         raise
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        what = f"is not {kind}: {error.problem or error.context}" + (f" (column {mark.column + 1})" if mark else "")
-        remedy = "check indentation, brackets and quotes; a name with brackets stands in quotation marks"
-        raise MechanismError(Finding(what, remedy=remedy, line=mark.line + 1 if mark else None)) from error
-    except YAMLError as error:
-        what = f"is not {kind}: {str(error).splitlines()[0]}"
-        raise MechanismError(Finding(what, remedy="check that it is a text file")) from error
-    except (ValueError, TypeError, LookupError, AttributeError, AssertionError, ArithmeticError) as error:
+    except RecursionError:
+        raise MechanismError(Finding("is nested too deeply", remedy="check brackets")) from None
+    except (YAMLError, ValueError, TypeError, LookupError, AttributeError, AssertionError, ArithmeticError) as error:
         # ruamel lets some of Python's own errors pass on text that is no YAML
-        raise MechanismError(Finding(f"is not {kind}: {error}", remedy="check that it is a text file")) from error
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        line = re.search(r"at line (\d+), column \d+", str(error))  # of TOML
+        why = getattr(error, "problem", None) or getattr(error, "context", None) or str(error).partition("\n")[0]
+        what = f"is not {kind}: {why}" + (f" (column {mark.column + 1})" if mark else "")
+        remedy = "check indentation, brackets and quotes; a name with brackets stands in quotation marks"
+        at = mark.line + 1 if mark else int(line[1]) if line else None
+        raise MechanismError(Finding(what, remedy=remedy, line=at)) from error
     if not isinstance(root, MappingNode):
         what = "is not a group of entries (key: value) at its top"
         raise MechanismError(Finding(what, remedy="start from one of the examples", line=1))
-    builder = _Builder(text)
+    builder = _Builder()
     data = builder.build(root, "")
     if builder.findings:
         raise MechanismError(builder.findings)
     return data, builder.lines
+
+
+def _parse_toml(text: str) -> dict[str, Any]:
+    deep = _DEEP_KEY.search(text)  # tomllib takes a time with the square of the dots
+    data = {} if deep else tomllib.loads(text)
+    if deep or _depth(data) > MAX_DEPTH:
+        line = text.count("\n", 0, deep.start()) + 1 if deep else None
+        raise MechanismError(Finding("is nested too deeply", remedy="check brackets and the dots in keys", line=line))
+    return data
+
+
+def _depth(data: Any) -> int:
+    """How deeply groups and lists are nested."""
+    below = data.values() if isinstance(data, dict) else data
+    return 1 + max(map(_depth, below), default=0) if isinstance(data, dict | list) else 0
 
 
 @lru_cache(maxsize=2)  # a verb reads its model for the numbers, and again for the lines of findings
@@ -262,72 +236,40 @@ class _Parser(Parser):
 class _Builder:
     """Plain data from YAML nodes, with the line of every path, and what is wrong on the way."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self) -> None:
         self.lines: Lines = {}
         self.findings: list[Finding] = []
 
     def build(self, node: Node, path: str) -> Any:
         """The value of a node at a path."""
         self.lines.setdefault(path, node.start_mark.line + 1)
-        if isinstance(node, MappingNode):
-            return self._mapping(node, path)
         if isinstance(node, SequenceNode):
-            items = self._uncut(node, [(item, f"{path}.{index}") for index, item in enumerate(node.value)])
-            return [self.build(item, below) for item, below in items]
-        assert isinstance(node, ScalarNode)  # there are no other nodes
-        return self._scalar(node, path)
-
-    def _uncut(self, node: MappingNode | SequenceNode, items: list[tuple[Node, str]]) -> list[tuple[Node, str]]:
-        """The values of a list or group, by path, without those that YAML cut out of an expression at its commas."""
-        pieces, until = [], 0
-        for item, path in items:
-            start = item.start_mark.index
-            if start < until:
-                continue
-            pieces.append((item, path))
-            plain = node.flow_style and isinstance(item, ScalarNode) and not item.style
-            if plain and item.value.count("(") > item.value.count(")"):
-                inner = _balanced(self.text[start : node.end_mark.index - 1])
-                until = start + len(inner)
-                if inner:
-                    excerpt, kind = " ".join(inner.split()), "braces" if isinstance(node, MappingNode) else "brackets"
-                    what = f"'{excerpt[:80]}' has a comma, which ends a value in {kind}"
-                    mark = "'" if '"' in excerpt else '"'
-                    remedy = f"put it in quotation marks: {mark}{excerpt}{mark}"
-                    self.findings.append(Finding(what, path, remedy, line=item.start_mark.line + 1))
-        return pieces
-
-    def _mapping(self, node: MappingNode, path: str) -> dict[str, Any]:
+            return [self.build(item, f"{path}.{index}") for index, item in enumerate(node.value)]
+        if isinstance(node, ScalarNode):
+            return self._scalar(node, path)
         values: dict[str, Any] = {}
-        parts = [(value, f"{path}.{key.value}".lstrip(".")) for key, value in node.value]
-        uncut = {id(value) for value, _ in self._uncut(node, parts)}
         for key_node, value_node in node.value:
-            if id(value_node) not in uncut:
-                continue
-            line = key_node.start_mark.line + 1
+            key = self._text(key_node, path) if isinstance(key_node, ScalarNode) else ""
+            below = f"{path}.{key}".lstrip(".")
             if not isinstance(key_node, ScalarNode):
-                self.findings.append(Finding("a key is not a text", path, "write key: value", line=line))
-                continue
-            key = self._text(key_node, path)
-            below = f"{path}.{key}" if path else key
-            if key in values:
+                self._wrong(key_node, path, "a key is not a text", "write key: value")
+            elif key in values:
                 what = f"the key '{key}' is given twice, first in line {self.lines[below]}"
-                self.findings.append(Finding(what, below, "remove one of them", line=line))
-                continue
-            self.lines[below] = line
-            values[key] = self.build(value_node, below)
+                self._wrong(key_node, below, what, "remove one of them")
+            else:
+                self.lines[below] = key_node.start_mark.line + 1
+                values[key] = self.build(value_node, below)
         return values
+
+    def _wrong(self, node: Node, path: str, what: str, remedy: str) -> None:
+        self.findings.append(Finding(what, path, remedy, line=node.start_mark.line + 1))
 
     def _text(self, node: ScalarNode, path: str) -> str:
         """What a node says; half a sign, which JSON can escape, is in no text that can be written again."""
         text = str(node.value)
         encodable = text.encode("utf-8", "replace").decode()
         if encodable != text:
-            line = node.start_mark.line + 1
-            self.findings.append(
-                Finding(f"'{encodable[:40]}' has half a sign (\\ud800 …)", path, "remove it", line=line)
-            )
+            self._wrong(node, path, f"'{encodable[:40]}' has half a sign (\\ud800 …)", "remove it")
         return encodable
 
     def _scalar(self, node: ScalarNode, path: str) -> Any:
@@ -343,20 +285,8 @@ class _Builder:
                 case "null":
                     return None
         except ValueError:
-            remedy = "write a number as 12.5 or 1.25e1"
-            line = node.start_mark.line + 1
-            self.findings.append(Finding(f"'{text[:40]}' is not a number", path, remedy, line=line))
+            self._wrong(node, path, f"'{text[:40]}' is not a number", "write a number as 12.5 or 1.25e1")
         return text
-
-
-def _balanced(text: str) -> str:
-    """The beginning of a text up to the first comma outside parentheses; empty if some are left open."""
-    depth = 0
-    for place, sign in enumerate(text):
-        depth += (sign == "(") - (sign == ")")
-        if sign == "," and depth == 0:
-            return text[:place].rstrip()
-    return "" if depth else text.rstrip()
 
 
 def place(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:
@@ -371,15 +301,12 @@ def place(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[st
 
 def _rows(data: Mapping[str, Any]) -> dict[str, str]:
     """Where the rows of the loop stand, by the paths that findings have for them: loop.JOINT and joints.JOINT."""
-    rows = {f"loop.{row.get('joint')}": f"loop.{index}" for index, row in _groups(data.get("loop"))}
-    return rows | {f"joints.{name.partition('.')[2]}": row for name, row in rows.items()}
-
-
-def _groups(items: Any) -> list[tuple[int, dict[str, Any]]]:
-    """The groups of entries in a list, with their index."""
-    return [
-        (index, item) for index, item in enumerate(items if isinstance(items, list) else ()) if isinstance(item, dict)
+    stated = data.get("loop")
+    joints = [
+        row.get("joint") if isinstance(row, dict) else None for row in (stated if isinstance(stated, list) else ())
     ]
+    names = [(name, f"loop.{index}") for index, name in enumerate(joints) if name is not None]
+    return {f"{section}.{name}": row for name, row in names for section in ("loop", "joints")}
 
 
 def _line(where: str, lines: Lines, rows: Mapping[str, str]) -> int | None:

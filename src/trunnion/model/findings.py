@@ -59,7 +59,8 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     if error["input"] is None and kind != "missing":
         what, remedy = "is empty", "give it a value or remove it"
         if key[:1].isdigit():  # {mass: 1,5 kg} is read as mass: 1 and the key "5 kg"
-            what, remedy = f"the key '{key[:80]}' has no value", "write a decimal point, not a comma, as 1.5 kg"
+            what = f"the key '{key[:80]}' has no value"
+            remedy = "a comma ends a value in braces: write a decimal point, as 1.5 kg, or quotation marks"
     elif kind in ("quantity", "stated"):
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":

@@ -189,7 +189,6 @@ def _bought(mechanism: "Mechanism", result: "xr.Dataset") -> "Mechanism":
 
 def _named(findings: list[Finding], mechanism: "Mechanism") -> list[Finding]:
     """Findings about costs by the names that the file has for them."""
-    from trunnion.model.tolerances import cost_paths
 
-    names = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in cost_paths(mechanism, name)}
+    names = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in mechanism.cost_paths(name)}
     return [replace(finding, where=names.get(finding.where, finding.where)) for finding in findings]

@@ -10,7 +10,6 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
-from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
 from trunnion.solve.system import System
 
@@ -77,7 +76,7 @@ def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
         for path, entry in mechanism.parameter_set.entries.items()
         if path.startswith("links.") and ".points." in path
     ]
-    for tolerance in tolerated(mechanism):
+    for tolerance in mechanism.tolerated():
         used = [path for path, depends in placed if depends == (tolerance.path,)]
         links = list(dict.fromkeys(path.split(".")[1] for path in used))
         if tolerance.path.startswith("dimensions.") and len(links) > 1:

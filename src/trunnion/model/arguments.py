@@ -42,6 +42,7 @@ WORDS = {
 }
 NOUNS = {"methods": "method", "name": "method"}  # of studies, and of friction
 LISTS = (Sequence, Iterable)
+STRICT = ("trunnion.model.tolerances",)  # bases whose methods are public too
 LONGEST = 60  # letters of a value that a message repeats
 
 
@@ -62,7 +63,8 @@ def strict_arguments(public: Public) -> Public:
     where a list is taken is a list of one.
     """
     if inspect.isclass(public):
-        for name, member in list(vars(public).items()):
+        own = [vars(base) for base in reversed(public.__mro__) if base.__module__ in STRICT or base is public]
+        for name, member in [item for members in own for item in members.items()]:
             call = f"{public.__name__}.{name}".removesuffix(".__init__")
             if inspect.isfunction(member) and (name == "__init__" or not name.startswith("_")):
                 setattr(public, name, _strict(member, call))

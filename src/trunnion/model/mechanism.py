@@ -10,8 +10,6 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from trunnion.algebra.namespace import Number
@@ -25,22 +23,9 @@ from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.findings import schema_findings
 from trunnion.model.joint_parts import Joint, Seat, has_play, play
-from trunnion.model.limits import DIGITS
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Numbers
 from trunnion.model.places import place_of
-from trunnion.model.tolerances import (
-    Price,
-    Tolerance,
-    correlation,
-    keep_limits,
-    kept,
-    prices,
-    tolerated,
-    with_samples,
-    with_tolerances,
-    written_limits,
-)
+from trunnion.model.tolerances import Varying
 from trunnion.model.units import Kind
 
 if TYPE_CHECKING:
@@ -50,7 +35,7 @@ __all__ = ["Mechanism", "read_mechanism"]
 
 
 @strict_arguments
-class Mechanism(Numbers):
+class Mechanism(Varying):
     """A linkage: dimensions, links, joints, drivers, loads. See the sections' classes in `model.parts`.
 
     Built from plain mappings, numbers (SI) and texts with units, or from the classes. A mechanism that exists is
@@ -151,42 +136,6 @@ class Mechanism(Numbers):
         """What each parameter measures, with its SI unit, by path."""
         return {path: entry.kind for path, entry in self.parameter_set.entries.items()}
 
-    def tolerances(self) -> dict[str, tuple[float, float]]:
-        """(lower, upper) signed deviations in SI of every parameter that states them, by path.
-
-        A tolerance in `joint_defaults` is one of each joint that has it: the joints vary independently.
-        """
-        return written_limits(self)
-
-    def tolerated(self) -> list[Tolerance]:
-        """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±."""
-        return tolerated(self)
-
-    def correlation(self) -> NDArray[np.float64]:
-        """Correlation of the normal scores of the numbers of `tolerated`, in their order."""
-        return correlation(self)
-
-    def prices(self) -> list[Price]:
-        """What tolerances and plays cost, by path, as stated in `costs`; in the order of the file."""
-        return prices(self)
-
-    def with_tolerances(self, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> Mechanism:
-        """The mechanism with other tolerances: half widths by name, each about the middle of its limits.
-
-        A half width is in SI, or a text such as ±0.02 mm. The clearance of a joint, `joints.B.clearance`, is replaced
-        itself. Limits that stand with the number, `40 mm ± 0.02 mm`, move to `tolerances`. digits: how many
-        significant ones a half width is rounded down to. MechanismError for what is no half width.
-        """
-        return Mechanism(**with_tolerances(self, half_widths, digits))
-
-    def with_samples(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
-        """The mechanism with a number that varies as measured: deviations in the one column of a CSV file.
-
-        The unit stands in brackets in a header, `deviation [mm]`; without one they are SI. MechanismError with file
-        and line of what cannot be read.
-        """
-        return Mechanism(**with_samples(self, name, path))
-
     def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
@@ -205,7 +154,7 @@ class Mechanism(Numbers):
             window = isinstance(value, str) and location[0] == "measures" and location[-1] == "over"
             put: Any = [end.strip() for end in str(value).strip("[] ").split(",")] if window else value
             assign(data, location, put, self.coordinates)
-            keep_limits(self, name, value, data)
+            self.keep_limits(name, value, data)
 
     def path_of(self, name: str) -> str:
         """The path of the number that a name means in `with_values`, stated or not; MechanismError if it means none."""
@@ -219,7 +168,7 @@ class Mechanism(Numbers):
         """
         data, read = with_points(self.data(), {name: path})
         try:
-            return Mechanism(**kept(self, data))
+            return Mechanism(**self.kept(data))
         except MechanismError as error:
             raise MechanismError(place_findings(error.findings, read)) from None
 
@@ -236,10 +185,10 @@ class Mechanism(Numbers):
             raise MechanismError(Finding(f"'{law}' is not a friction law", remedy=remedy))
         if law == "off":
             changed = self.with_values(values) if values else self
-            return Mechanism(**kept(changed, with_law(changed.data(), law)))
+            return Mechanism(**changed.kept(with_law(changed.data(), law)))
         data = with_law(self.data(), law)
         self._replace(values or {}, data)
-        return Mechanism(**kept(self, data))
+        return Mechanism(**self.kept(data))
 
     def with_seats(self, seat: str) -> Mechanism:
         """The mechanism with one seating for all joints with play: "loaded" or "free"; MechanismError for another."""
@@ -249,7 +198,7 @@ class Mechanism(Numbers):
         data = self.data()
         for holder in (*data.get("joints", {}).values(), *data.get("loop", [])):
             holder.pop("seat", None)
-        return Mechanism(**kept(self, {**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
+        return Mechanism(**self.kept({**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
 
     def with_motions(self, laws: Mapping[str, MotionLaw]) -> Mechanism:
         """The mechanism whose drivers move as they were found to, by driver; its file and its digest stay the same."""

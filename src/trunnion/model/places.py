@@ -17,15 +17,15 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.changes import part_types, stated_at
 from trunnion.model.joint_parts import Friction
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, Numbers
+from trunnion.model.parameters import Location
 from trunnion.model.quantity import AnyQuantity, Quantity
 from trunnion.model.tolerance_parts import Cost, Variation
-from trunnion.model.tolerances import cost_paths
+from trunnion.model.tolerances import Varying
 
 __all__ = ["place_of"]
 
 
-def place_of(mechanism: Numbers, name: str) -> tuple[str, Location]:
+def place_of(mechanism: Varying, name: str) -> tuple[str, Location]:
     """The path of the number that a name means, empty if it is no number, and its place in the file.
 
     MechanismError if it means nothing.
@@ -45,7 +45,7 @@ def place_of(mechanism: Numbers, name: str) -> tuple[str, Location]:
     return entry.path, entry.location
 
 
-def _of_number(mechanism: Numbers, section: str, rest: str) -> tuple[str, Location]:
+def _of_number(mechanism: Varying, section: str, rest: str) -> tuple[str, Location]:
     """Place of the error, the tolerance or the cost of a number by any name of that, or of one of its keys."""
     of, _, key = rest.rpartition(".")
     keys = {"errors": (), "tolerances": Variation.model_fields, "costs": Cost.model_fields}[section]
@@ -54,8 +54,8 @@ def _of_number(mechanism: Numbers, section: str, rest: str) -> tuple[str, Locati
     stated: Mapping[str, Any] = getattr(mechanism, "variations" if section == "tolerances" else section)
     resolve = mechanism.parameter_set.resolve
     if section == "costs":
-        paths = {*cost_paths(mechanism, of)}
-        names = [cost for cost in stated if cost == of or paths.intersection(cost_paths(mechanism, cost))]
+        paths = {*mechanism.cost_paths(of)}
+        names = [cost for cost in stated if cost == of or paths.intersection(mechanism.cost_paths(cost))]
         if not names or not key:
             raise MechanismError(Finding(f"there is no cost '{rest}'", f"costs.{rest}", nearest(of, stated)))
         return "", (section, names[0], key)
@@ -70,7 +70,7 @@ def _of_number(mechanism: Numbers, section: str, rest: str) -> tuple[str, Locati
     return "", (section, name) if short else (section, name, key or "limits")
 
 
-def _of_key(mechanism: Numbers, name: str) -> Iterator[tuple[str, Location]]:
+def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
     """Paths and places of keys that entries of the file may state by a name: `B.pin.clearance`, `A.motor.limit` …"""
     first, *keys = name.split(".")
     if not keys and isinstance(getattr(mechanism, first, None), str):  # fits, over_constraint

@@ -9,9 +9,10 @@ import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,28 +27,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, Cost, Variation
 from trunnion.model.units import ANY, KINDS, UnitError, unit
 
-__all__ = [
-    "Price",
-    "ProcessChoice",
-    "Tolerance",
-    "clearance_of",
-    "correlation",
-    "cost_paths",
-    "ends_motion",
-    "further_entries",
-    "keep_limits",
-    "kept",
-    "may_vary",
-    "named_paths",
-    "price",
-    "prices",
-    "tolerated",
-    "towards",
-    "variations",
-    "with_samples",
-    "with_tolerances",
-    "written_limits",
-]
+__all__ = ["Price", "ProcessChoice", "Tolerance", "Varying", "ends_motion", "may_vary", "towards"]
 
 DEFAULTS = "joint_defaults."
 FULL_TURN = "direction"  # the distribution over all directions
@@ -72,6 +52,11 @@ class Tolerance:
     direction: str = ""
 
     @property
+    def middle(self) -> float:
+        """The middle of the limits."""
+        return (self.lower + self.upper) / 2
+
+    @property
     def half_width(self) -> float:
         """Half the distance of the limits."""
         return (self.upper - self.lower) / 2
@@ -80,162 +65,6 @@ class Tolerance:
     def can_be_chosen(self) -> bool:
         """Whether its limits are a choice: not where it varies as measured, or over a full turn."""
         return "values" not in self.options and self.distribution != FULL_TURN
-
-
-# ---- what names mean ------------------------------------------------------------------------------------------
-
-
-def may_vary(entry: Entry) -> bool:
-    """Whether a number is one of the mechanism itself: not of its measures, nor of where it begins and ends."""
-    outside = entry.path.partition(".")[0] in ("measures", "assembly")
-    return not entry.varies and not outside and not ends_motion(entry.path)
-
-
-def ends_motion(path: str) -> bool:
-    """Whether a number says where a driver begins or ends: samples are compared at the same coordinates of it."""
-    return path.startswith("drivers.") and path.split(".")[2:3] in (["start"], ["range"])
-
-
-def named_paths(mechanism: Numbers, names: Iterable[str]) -> list[str]:
-    """The paths that names mean, those of `joint_defaults` as the numbers of the joints; unknown ones left out."""
-    numbers, paths = mechanism.parameter_set, list[str]()
-    for name in names:
-        with suppress(MechanismError):
-            path = numbers.resolve(name)
-            all_joints = [entry.path for entry in numbers.entries.values() if entry.alias == path]
-            paths += all_joints if path.startswith(DEFAULTS) else [path]
-    return paths
-
-
-def clearance_of(mechanism: Numbers, name: str) -> str:
-    """The path of the clearance that `joints.B.clearance` or `B.clearance` means, of pin or guide; empty if none.
-
-    The play of a joint is meant, and not a tolerance of the number that states it, which is `joints.B.pin.clearance`.
-    """
-    joint = name.removeprefix("joints.").removesuffix(".clearance")
-    paths = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")] if name.endswith(".clearance") else []
-    return next((path for path in paths if path in mechanism.parameter_set.entries), "")
-
-
-def cost_paths(mechanism: Numbers, name: str) -> list[str]:
-    """The paths that a name in `costs` means: those of numbers, or `joints.B.clearance`; none if it means nothing."""
-    clearance = clearance_of(mechanism, name)
-    return [f"joints.{clearance.split('.')[1]}.clearance"] if clearance else named_paths(mechanism, [name])
-
-
-def towards(path: str, entries: Mapping[str, Entry]) -> str:
-    """The angle of the direction in which a tilt or an offset of a misaligned axis points; empty for others."""
-    before, _, key = path.rpartition(".misalignment.")
-    angle = f"{before}.misalignment." + {"tilt": "towards", "offset": "offset_towards"}.get(key, "")
-    return angle if angle in entries else ""
-
-
-# ---- what varies ----------------------------------------------------------------------------------------------
-
-
-def variations(mechanism: Numbers) -> dict[str, tuple[str, Variation]]:
-    """Name and entry of `tolerances` by path; what is stated of a joint goes before what is stated of all."""
-    numbers = mechanism.parameter_set
-    single: dict[str, tuple[str, Variation]] = {}
-    of_all: dict[str, tuple[str, Variation]] = {}
-    for name, variation in mechanism.variations.items():
-        for path in named_paths(mechanism, [name]):
-            if may_vary(numbers.entries[path]):
-                (single if numbers.resolve(name) == path else of_all).setdefault(path, (name, variation))
-    return {**of_all, **single}
-
-
-def written_limits(mechanism: Numbers) -> dict[str, tuple[float, float]]:
-    """(lower, upper) signed deviations, SI, of every number that is stated with them, by path.
-
-    Those in `joint_defaults` are of each joint that follows it.
-    """
-    return {
-        path: entry.quantity.tolerance
-        for path, entry in mechanism.parameter_set.entries.items()
-        if entry.quantity.tolerance
-        and not path.startswith(DEFAULTS)
-        and (not entry.alias or entry.alias.startswith(DEFAULTS))
-    }
-
-
-def tolerated(mechanism: Numbers) -> list[Tolerance]:
-    """Every number that varies, in the order of the parameters."""
-    varied, limits_written = variations(mechanism), written_limits(mechanism)
-    return [
-        _tolerance(mechanism, entry, varied.get(path, ("", Variation()))[1], limits_written.get(path))
-        for path, entry in mechanism.parameter_set.entries.items()
-        if path in varied or (path in limits_written and may_vary(entry))
-    ]
-
-
-def _tolerance(
-    mechanism: Numbers, entry: Entry, variation: Variation, limits_written: tuple[float, float] | None
-) -> Tolerance:
-    """Of a number, by its entry of `tolerances` and the limits that stand with the number itself.
-
-    Defaults are for what the distribution takes and the entry does not say; a default cpk is that beside the default
-    cp.
-    """
-    numbers, defaults = mechanism.parameter_set, mechanism.tolerance_defaults
-    dimensions = numbers.dimension_values
-    distribution = variation.distribution or defaults.distribution
-    options: dict[str, float | tuple[float, ...]] = {}
-    for key in DISTRIBUTIONS[distribution]:
-        option = getattr(variation, key)
-        if option is None and not (key == "cpk" and variation.cp is not None):
-            option = getattr(defaults, key, None)
-        if isinstance(option, tuple):
-            options[key] = tuple(float(item.evaluate(dimensions)) for item in option)
-        elif option is not None:
-            options[key] = float(option.evaluate(dimensions))
-    sample = options.get("values")
-    if variation.limits is not None:
-        ends = (variation.limits.lower, variation.limits.upper)
-        lower, upper = (float(end.evaluate(dimensions)) for end in ends)
-    elif limits_written is not None:
-        lower, upper = limits_written
-    elif isinstance(sample, tuple):
-        lower, upper = min(sample), max(sample)
-    else:
-        lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
-    direction = towards(entry.path, numbers.entries) if variation.direction else ""
-    return Tolerance(entry.path, float(numbers.nominal[entry.path]), lower, upper, distribution, options, direction)
-
-
-def correlation(mechanism: Numbers) -> NDArray[np.float64]:
-    """The matrix of the correlations of all tolerated numbers, in the order of `tolerated`."""
-    place = {tolerance.path: index for index, tolerance in enumerate(tolerated(mechanism))}
-    matrix = np.eye(len(place))
-    for pair in mechanism.correlations:
-        paths = [path for path in named_paths(mechanism, pair.of) if path in place]
-        value = float(pair.coefficient.evaluate(mechanism.parameter_set.dimension_values))
-        for first, other in combinations(dict.fromkeys(paths), 2):
-            matrix[place[first], place[other]] = matrix[place[other], place[first]] = value
-    return matrix
-
-
-def further_entries(mechanism: Numbers) -> list[Entry]:
-    """Every quantity of the sections about tolerances and costs: what is no number of the mechanism itself.
-
-    What may be any quantity measures what the number does that the entry is of, of a cost of a play a length.
-    """
-    kinds, listed = measured(mechanism, mechanism.entries), list[Entry]()
-    for key in ("tolerance_defaults", "tolerances", "correlations", "costs", "processes"):
-        section = getattr(mechanism, "variations" if key == "tolerances" else key)
-        parts = section.items() if isinstance(section, Mapping) else [("", section)]
-        for name, part in parts:
-            kind = ANY
-            if key in ("tolerances", "costs"):
-                kind = KINDS["length"] if key == "costs" else ANY
-                with suppress(MechanismError):  # a finding of its own
-                    kind = kinds[mechanism.parameter_names.resolve(name)]
-            for entry in walk(part, f"{key}.{name}".rstrip("."), (key, name) if name else (key,)):
-                listed.append(replace(entry, kind=kind) if entry.kind is ANY else entry)
-    return listed
-
-
-# ---- what it costs --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -266,137 +95,277 @@ class Price:
     choices: tuple[ProcessChoice, ...] = ()
 
 
-def prices(mechanism: Numbers) -> list[Price]:
-    """Every cost with its numbers, in the order of the file; what `joint_defaults` states is a price of each joint.
-
-    What varies as measured or over a full turn has no tolerance to choose, and no price.
-    """
-    if not mechanism.costs:
-        return []
-    fixed = {tolerance.path for tolerance in tolerated(mechanism) if not tolerance.can_be_chosen}
-    paths = [(path, cost) for name, cost in mechanism.costs.items() for path in cost_paths(mechanism, name)]
-    return [price(mechanism, path, cost) for path, cost in paths if path not in fixed]
+def may_vary(entry: Entry) -> bool:
+    """Whether a number is one of the mechanism itself: not of its measures, nor of where it begins and ends."""
+    outside = entry.path.partition(".")[0] in ("measures", "assembly")
+    return not entry.varies and not outside and not ends_motion(entry.path)
 
 
-def price(mechanism: Numbers, path: str, cost: Cost) -> Price:
-    """The numbers of a cost of a number or play; MechanismError where a process has no grade of its size."""
-    numbers = mechanism.parameter_set
-
-    def value(quantity: Quantity | None, absent: float = 0.0) -> float:
-        return absent if quantity is None else float(quantity.evaluate(numbers.dimension_values))
-
-    parameters = {key: value(getattr(cost, key)) for key in FORMULA if getattr(cost, key) is not None}
-    if cost.model:
-        parameters = {"A": 0.0, **parameters, "unit": float(unit(cost.unit)[0]) if cost.unit else 1.0}
-    ways = cost.options or {}
-    choices = [ProcessChoice(name, value(way.tolerance), value(way.cost)) for name, way in ways.items()]
-    for grade, paid in mechanism.processes[cost.process].items() if cost.process else ():
-        half = standard_tolerance(abs(float(numbers.nominal[path])), int(grade)) / 2
-        choices.append(ProcessChoice(f"IT{grade}", half, value(paid)))
-    return Price(
-        path,
-        path not in numbers.entries,
-        cost.model or "",
-        parameters,
-        value(cost.least),
-        value(cost.most, np.inf),
-        cost.group or "",
-        tuple(sorted(choices, key=lambda choice: (choice.cost, choice.tolerance))),
-    )
+def ends_motion(path: str) -> bool:
+    """Whether a number says where a driver begins or ends: samples are compared at the same coordinates of it."""
+    return path.startswith("drivers.") and path.split(".")[2:3] in (["start"], ["range"])
 
 
-# ---- other tolerances -----------------------------------------------------------------------------------------
+def towards(path: str, entries: Mapping[str, Entry]) -> str:
+    """The angle of the direction in which a tilt or an offset of a misaligned axis points; empty for others."""
+    before, _, key = path.rpartition(".misalignment.")
+    angle = f"{before}.misalignment." + {"tilt": "towards", "offset": "offset_towards"}.get(key, "")
+    return angle if angle in entries else ""
 
 
-def with_tolerances(mechanism: Numbers, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> dict[str, Any]:
-    """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI or text, by name."""
-    numbers, data = mechanism.parameter_set, mechanism.data()
-    kinds, varied = measured(mechanism, numbers.entries.values()), variations(mechanism)
-    tolerances = {item.path: item for item in tolerated(mechanism)}
-    findings: list[Finding] = []
-    for name, half_width_text in half_widths.items():
-        play = clearance_of(mechanism, name)
-        path = play or numbers.resolve(name)
-        tolerance, kind = tolerances.get(path), KINDS["length"] if play else kinds[path]
-        if not play and (tolerance is None or not tolerance.can_be_chosen):
-            what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
-            findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy="state limits in tolerances: {…}"))
-            continue
+class Varying(Numbers):
+    """A model whose numbers vary and whose tolerances cost something."""
+
+    # ---- what names mean
+
+    def named_paths(self, names: Iterable[str]) -> list[str]:
+        """The paths that names mean, those of `joint_defaults` as the numbers of the joints; unknown ones left out."""
+        numbers, paths = self.parameter_set, list[str]()
+        for name in names:
+            with suppress(MechanismError):
+                path = numbers.resolve(name)
+                all_joints = [entry.path for entry in numbers.entries.values() if entry.alias == path]
+                paths += all_joints if path.startswith(DEFAULTS) else [path]
+        return paths
+
+    def clearance_of(self, name: str) -> str:
+        """The path of the clearance that `joints.B.clearance` or `B.clearance` means, of pin or guide; empty if none.
+
+        The play of a joint is meant, not a tolerance of the number that states it, which is `joints.B.pin.clearance`.
+        """
+        joint = name.removeprefix("joints.").removesuffix(".clearance")
+        paths = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")] if name.endswith(".clearance") else []
+        return next((path for path in paths if path in self.parameter_set.entries), "")
+
+    def cost_paths(self, name: str) -> list[str]:
+        """The paths that a name in `costs` means: of numbers, or `joints.B.clearance`; none if it means nothing."""
+        clearance = self.clearance_of(name)
+        return [f"joints.{clearance.split('.')[1]}.clearance"] if clearance else self.named_paths([name])
+
+    # ---- what varies
+
+    @cached_property
+    def variations_by_path(self) -> Mapping[str, tuple[str, Variation]]:
+        """Name and entry of `tolerances` by path; what is stated of a joint goes before what is stated of all."""
+        numbers = self.parameter_set
+        single: dict[str, tuple[str, Variation]] = {}
+        of_all: dict[str, tuple[str, Variation]] = {}
+        for name, variation in self.variations.items():
+            for path in self.named_paths([name]):
+                if may_vary(numbers.entries[path]):
+                    (single if numbers.resolve(name) == path else of_all).setdefault(path, (name, variation))
+        return {**of_all, **single}
+
+    def tolerances(self) -> dict[str, tuple[float, float]]:
+        """(lower, upper) signed deviations in SI of every parameter that states them, by path.
+
+        A tolerance in `joint_defaults` is one of each joint that has it: the joints vary independently.
+        """
+        entries = self.parameter_set.entries.values()
+        return {entry.path: entry.quantity.tolerance for entry in entries
+                if entry.quantity.tolerance and not entry.path.startswith(DEFAULTS)
+                and (not entry.alias or entry.alias.startswith(DEFAULTS))}  # fmt: skip
+
+    def tolerated(self) -> list[Tolerance]:
+        """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±."""
+        varied, written_limits = self.variations_by_path, self.tolerances()
+        return [
+            self._tolerance(entry, varied.get(path, ("", Variation()))[1], written_limits.get(path))
+            for path, entry in self.parameter_set.entries.items()
+            if path in varied or (path in written_limits and may_vary(entry))
+        ]
+
+    def _tolerance(self, entry: Entry, variation: Variation, written_limits: tuple[float, float] | None) -> Tolerance:
+        """Of a number, by its entry of `tolerances` and the limits that stand with the number itself.
+
+        Defaults are for what the distribution takes and the entry does not say; a default cpk is that beside the
+        default cp.
+        """
+        numbers, defaults = self.parameter_set, self.tolerance_defaults
+        distribution = variation.distribution or defaults.distribution
+
+        def value(quantity: Quantity) -> float:
+            return float(quantity.evaluate(numbers.dimension_values))
+
+        options: dict[str, float | tuple[float, ...]] = {}
+        for key in DISTRIBUTIONS[distribution]:
+            option = getattr(variation, key)
+            if option is None and not (key == "cpk" and variation.cp is not None):
+                option = getattr(defaults, key, None)
+            if option is not None:
+                options[key] = tuple(map(value, option)) if isinstance(option, tuple) else value(option)
+        sample = options.get("values")
+        lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
+        if variation.limits is not None:
+            lower, upper = value(variation.limits.lower), value(variation.limits.upper)
+        elif written_limits is not None:
+            lower, upper = written_limits
+        elif isinstance(sample, tuple):
+            lower, upper = min(sample), max(sample)
+        direction = towards(entry.path, numbers.entries) if variation.direction else ""
+        return Tolerance(entry.path, float(numbers.nominal[entry.path]), lower, upper, distribution, options, direction)
+
+    def correlation(self) -> NDArray[np.float64]:
+        """Correlation of the normal scores of the numbers of `tolerated`, in their order."""
+        place = {tolerance.path: index for index, tolerance in enumerate(self.tolerated())}
+        matrix = np.eye(len(place))
+        for pair in self.correlations:
+            paths = [path for path in self.named_paths(pair.of) if path in place]
+            value = float(pair.coefficient.evaluate(self.parameter_set.dimension_values))
+            for first, other in combinations(dict.fromkeys(paths), 2):
+                matrix[place[first], place[other]] = matrix[place[other], place[first]] = value
+        return matrix
+
+    @cached_property
+    def further_entries(self) -> tuple[Entry, ...]:
+        """Every quantity of the sections about tolerances and costs: what is no number of the mechanism itself.
+
+        What may be any quantity measures what the number does that the entry is of, of a cost of a play a length.
+        """
+        kinds, listed = measured(self, self.entries), list[Entry]()
+        for key in ("tolerance_defaults", "tolerances", "correlations", "costs", "processes"):
+            section = getattr(self, "variations" if key == "tolerances" else key)
+            for name, part in section.items() if isinstance(section, Mapping) else [("", section)]:
+                kind = KINDS["length"] if key == "costs" else ANY
+                if key in ("tolerances", "costs"):
+                    with suppress(MechanismError):  # a finding of its own
+                        kind = kinds[self.parameter_names.resolve(name)]
+                for entry in walk(part, f"{key}.{name}".rstrip("."), (key, name) if name else (key,)):
+                    listed.append(replace(entry, kind=kind) if entry.kind is ANY else entry)
+        return tuple(listed)
+
+    # ---- what it costs
+
+    def prices(self) -> list[Price]:
+        """What tolerances and plays cost, by path, in the order of the file; of `joint_defaults` one of each joint.
+
+        What varies as measured or over a full turn has no tolerance to choose, and no price.
+        """
+        if not self.costs:
+            return []
+        fixed = {tolerance.path for tolerance in self.tolerated() if not tolerance.can_be_chosen}
+        paths = [(path, cost) for name, cost in self.costs.items() for path in self.cost_paths(name)]
+        return [self.price(path, cost) for path, cost in paths if path not in fixed]
+
+    def price(self, path: str, cost: Cost) -> Price:
+        """The numbers of a cost of a number or play; MechanismError where a process has no grade of its size."""
+        numbers = self.parameter_set
+
+        def value(quantity: Quantity | None, absent: float = 0.0) -> float:
+            return absent if quantity is None else float(quantity.evaluate(numbers.dimension_values))
+
+        parameters = {key: value(getattr(cost, key)) for key in FORMULA if getattr(cost, key) is not None}
+        if cost.model:
+            parameters = {"A": 0.0, **parameters, "unit": float(unit(cost.unit)[0]) if cost.unit else 1.0}
+        ways = (cost.options or {}).items()
+        choices = [ProcessChoice(name, value(way.tolerance), value(way.cost)) for name, way in ways]
+        for grade, paid in self.processes[cost.process].items() if cost.process else ():
+            half = standard_tolerance(abs(float(numbers.nominal[path])), int(grade)) / 2
+            choices.append(ProcessChoice(f"IT{grade}", half, value(paid)))
+        choices.sort(key=lambda choice: (choice.cost, choice.tolerance))
+        least, most, play = value(cost.least), value(cost.most, np.inf), path not in numbers.entries
+        return Price(path, play, cost.model or "", parameters, least, most, cost.group or "", tuple(choices))
+
+    # ---- other tolerances
+
+    def with_tolerances(self, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> Self:
+        """The mechanism with other tolerances: half widths by name, each about the middle of its limits.
+
+        A half width is in SI, or a text such as ±0.02 mm. The clearance of a joint, `joints.B.clearance`, is replaced
+        itself. Limits that stand with the number, `40 mm ± 0.02 mm`, move to `tolerances`. digits: how many
+        significant ones a half width is rounded down to. MechanismError for what is no half width.
+        """
+        numbers, data = self.parameter_set, self.data()
+        kinds = measured(self, numbers.entries.values())
+        tolerances = {item.path: item for item in self.tolerated()}
+        findings: list[Finding] = []
+        for name, stated in half_widths.items():
+            play = self.clearance_of(name)
+            path = play or numbers.resolve(name)
+            tolerance, kind, entry = tolerances.get(path), kinds[path], numbers.entries[path]
+            if not play and (tolerance is None or not tolerance.can_be_chosen):
+                what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
+                remedy = "state limits in tolerances: {…}"
+                findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy=remedy))
+                continue
+            try:
+                half = half_width(stated, kind, name)
+            except MechanismError as error:
+                findings += error.findings
+                continue
+            if play or tolerance is None:
+                text = written(half, kind, digits)
+                assign(data, entry.location, text, self.coordinates)
+                self.keep_limits(play, text, data)
+            else:
+                self._vary(data, path, {"limits": limits_text(tolerance.middle, half, kind, digits)})
+                if entry.quantity.tolerance and stated_at(data, entry.location) == entry.quantity.source:
+                    assign(data, entry.location, entry.quantity.alone, self.coordinates)  # its limits stand there now
+        if findings:
+            raise MechanismError(findings)
+        return type(self)(**data)
+
+    def with_samples(self, name: str, path: str | os.PathLike[str]) -> Self:
+        """The mechanism with a number that varies as measured: deviations in the one column of a CSV file.
+
+        The unit stands in brackets in a header, `deviation [mm]`; without one they are SI. Limits stated are kept.
+        MechanismError with file and line of what cannot be read.
+        """
+        target, data = self.parameter_set.resolve(name), self.data()
+        deviations = column(Path(path), measured(self, self.entries)[target])
+        self._vary(data, target, {"distribution": "sample", "values": deviations}, beside=("limits",))
+        return type(self)(**data)
+
+    def _vary(
+        self, data: dict[str, Any], path: str, keys: Mapping[str, Any], beside: Iterable[str] = Variation.model_fields
+    ) -> None:
+        """Put keys into the entry of `tolerances` of a number, of this joint alone where it is of all joints.
+
+        beside: which of its other keys stay.
+        """
+        section = data.setdefault("tolerances", {})
+        name = self.variations_by_path.get(path, (path,))[0]
+        stated = section.get(name, {})
+        others = stated if isinstance(stated, dict) else {"limits": stated}
+        entry = {**{key: value for key, value in others.items() if key in beside}, **keys}
+        own_name = name if self.parameter_set.resolve(name) == path else path
+        section[own_name] = entry["limits"] if entry.keys() == {"limits"} else entry
+
+    def keep_limits(self, name: str, value: Any, data: dict[str, Any]) -> None:
+        """Write the limits that stood with a number, as in `40 mm ± 0.02 mm`, into `tolerances` where it is replaced by
+        one without: another nominal value is no other tolerance.
+        """
         try:
-            half = half_width(half_width_text, kind, name)
-        except MechanismError as error:
-            findings += error.findings
-            continue
-        if play or tolerance is None:
-            text = written(half, kind, digits)
-            assign(data, numbers.entries[play].location, text, mechanism.coordinates)
-            keep_limits(mechanism, play, text, data)
-            continue
-        section, entry = data.setdefault("tolerances", {}), numbers.entries[path]
-        key = varied.get(path, (path,))[0]
-        others = section.get(key) if isinstance(section.get(key), dict) else {}
-        text = limits_text((tolerance.lower + tolerance.upper) / 2, half, kind, digits)
-        own_key = path if numbers.resolve(key).startswith(DEFAULTS) else key
-        section[own_key] = {**others, "limits": text} if others.keys() - {"limits"} else text
-        if entry.quantity.tolerance and stated_at(data, entry.location) == entry.quantity.source:
-            assign(data, entry.location, entry.quantity.alone, mechanism.coordinates)  # its limits stand there now
-    if findings:
-        raise MechanismError(findings)
-    return data
+            entry = self.parameter_set.entries[self.parameter_set.resolve(name)]
+            again = Quantity.read(value, entry.kind).tolerance is not None
+        except (MechanismError, UnitError):  # no number, or a finding of its own
+            return
+        follows = entry.alias and not entry.alias.startswith(DEFAULTS)
+        if again or entry.quantity.tolerance is None or follows or not may_vary(entry):
+            return
+        lower, upper = entry.quantity.tolerance
+        if self.variations_by_path.get(entry.path, ("", Variation()))[1].limits is None:
+            kind = measured(self, self.entries)[entry.path]
+            self._vary(data, entry.path, {"limits": limits_text((lower + upper) / 2, (upper - lower) / 2, kind)})
 
+    def kept(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Plain data made of that of this mechanism, without errors, tolerances and costs of numbers it no longer has.
 
-def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any]) -> None:
-    """Write the limits that stood with a number, as in `40 mm ± 0.02 mm`, into `tolerances` where it is replaced by one
-    without: another nominal value is no other tolerance.
-    """
-    try:
-        entry = mechanism.parameter_set.entries[mechanism.parameter_set.resolve(name)]
-        again = Quantity.read(value, entry.kind).tolerance is not None
-    except (MechanismError, UnitError):  # no number, or a finding of its own
-        return
-    follows = entry.alias and not entry.alias.startswith(DEFAULTS)
-    if again or entry.quantity.tolerance is None or follows or not may_vary(entry):
-        return
-    lower, upper = entry.quantity.tolerance
-    section = data.setdefault("tolerances", {})
-    key, variation = variations(mechanism).get(entry.path, (entry.path, Variation()))
-    if variation.limits is None:
-        kind = measured(mechanism, mechanism.entries)[entry.path]
-        others = section.get(key) if isinstance(section.get(key), dict) else {}
-        section[key] = {**others, "limits": limits_text((lower + upper) / 2, (upper - lower) / 2, kind)}
+        So a mechanism without friction has no tolerance of a coefficient. MechanismError if they make no mechanism.
+        """
+        named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
+        if not named:
+            return dict(data)
+        bare = {key: value for key, value in data.items() if key not in (*named, "correlations", "processes")}
+        other = type(self)(**bare)
 
+        def has(name: str) -> bool:
+            with suppress(MechanismError):
+                return bool(other.clearance_of(name) or other.parameter_set.resolve(name.removeprefix("errors.")))
+            return False
 
-def kept(mechanism: Numbers, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
-
-    So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.
-    """
-    named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
-    if not named:
-        return dict(data)
-    bare = {key: value for key, value in data.items() if key not in (*named, "correlations", "processes")}
-    other = type(mechanism)(**bare)
-
-    def has(name: str) -> bool:
-        with suppress(MechanismError):
-            return bool(clearance_of(other, name) or other.parameter_set.resolve(name.removeprefix("errors.")))
-        return False
-
-    rest: dict[str, Any] = {key: {name: item for name, item in data[key].items() if has(name)} for key in named}
-    if "correlations" in data:
-        rows = [(row["of"], {**row, "of": [name for name in row["of"] if has(name)]}) for row in data["correlations"]]
-        rest["correlations"] = [row for before, row in rows if row["of"] == before or len(row["of"]) > 1]
-    return {**data, **rest}
-
-
-def with_samples(mechanism: Numbers, name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Plain data of the mechanism with a number that varies as the deviations in a file; limits stated are kept."""
-    numbers = mechanism.parameter_set
-    target = numbers.resolve(name)
-    deviations = column(Path(path), measured(mechanism, mechanism.entries)[target])
-    key, variation = variations(mechanism).get(target, (target, Variation()))
-    limits = {} if variation.limits is None else {"limits": variation.limits.source}
-    data = mechanism.data()
-    own_key = key if numbers.resolve(key) == target else target
-    data.setdefault("tolerances", {})[own_key] = {**limits, "distribution": "sample", "values": deviations}
-    return data
+        rest: dict[str, Any] = {key: {name: item for name, item in data[key].items() if has(name)} for key in named}
+        if "correlations" in data:
+            rows = [(row, [name for name in row["of"] if has(name)]) for row in data["correlations"]]
+            rest["correlations"] = [{**row, "of": of} for row, of in rows if of == row["of"] or len(of) > 1]
+        return {**data, **rest}

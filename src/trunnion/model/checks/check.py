@@ -31,11 +31,11 @@ from trunnion.model.checks.tolerances import cost_values, meant, tolerance_names
 from trunnion.model.checks.units import forgotten_units, plain_angles, thousands
 from trunnion.model.joint_parts import has_pin, motions
 from trunnion.model.names import ERRORS, nearest
-from trunnion.model.parameters import Entry, Numbers, ParameterSet, dimension_errors
+from trunnion.model.parameters import Entry, ParameterSet, dimension_errors
 from trunnion.model.parts import AT, InertiaTensor, Link
 from trunnion.model.quantity import evaluation_order
 from trunnion.model.rules import InSpace, Refers, faults, group_findings, key_findings, limit_findings
-from trunnion.model.tolerances import ends_motion, further_entries
+from trunnion.model.tolerances import Varying, ends_motion
 from trunnion.model.units import ANY, Dimension, UnitError
 
 __all__ = ["check_model", "check_values"]
@@ -46,7 +46,7 @@ INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2
 ALONG = 1e-6  # sine of the angle below which `x` lies along `axis`: what is left of it across is rounding of the file
 
 
-def check_model(mechanism: Numbers) -> list[Finding]:
+def check_model(mechanism: Varying) -> list[Finding]:
     """What is wrong or doubtful with a model; of errors those of the first stage that has any."""
     findings: list[Finding] = []
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
@@ -57,7 +57,7 @@ def check_model(mechanism: Numbers) -> list[Finding]:
     return list(dict.fromkeys(findings))  # a default that several joints share is found once
 
 
-def _references(mechanism: Numbers) -> Iterator[Finding]:
+def _references(mechanism: Varying) -> Iterator[Finding]:
     """Whether the space is the one that is stated, and what names refer to is there."""
     sizes = [len(place.at) for link in mechanism.links.values() for place in link.points.values()]
     if "space" not in mechanism.model_fields_set and (mechanism.loop or sizes.count(3) > len(sizes) / 2):
@@ -78,7 +78,7 @@ def _references(mechanism: Numbers) -> Iterator[Finding]:
         yield from check_measure(mechanism, measure, f"measures.{name}")
 
 
-def _together(mechanism: Numbers) -> Iterator[Finding]:
+def _together(mechanism: Varying) -> Iterator[Finding]:
     """Whether the parts go together, each by itself and in its place, and the units of every expression."""
     yield from _quantities(mechanism)
     yield from _links(mechanism)
@@ -102,7 +102,7 @@ def _together(mechanism: Numbers) -> Iterator[Finding]:
     yield from tolerance_names(mechanism)
 
 
-def _numbers(mechanism: Numbers) -> Iterator[Finding]:
+def _numbers(mechanism: Varying) -> Iterator[Finding]:
     """What the numbers make impossible or doubtful."""
     yield from check_values(mechanism, mechanism.parameter_set)
     yield from forgotten_units(mechanism)
@@ -113,14 +113,14 @@ def _numbers(mechanism: Numbers) -> Iterator[Finding]:
 # ---- names and units of expressions ---------------------------------------------------------------------------
 
 
-def _quantities(mechanism: Numbers) -> Iterator[Finding]:
+def _quantities(mechanism: Varying) -> Iterator[Finding]:
     """Names and units in every expression; dimensions that nothing uses."""
     dimensions: dict[str, Dimension | None] = {}
     yield from _dimensions(mechanism, dimensions)
     yield from tables(mechanism, dimensions)
     moving = {**motion_dimensions(mechanism, dimensions), **dimensions}
     sound: list[tuple[Entry, Mapping[str, Dimension | None]]] = []
-    entries = (*mechanism.entries, *further_entries(mechanism))
+    entries = (*mechanism.entries, *mechanism.further_entries)
     for entry in entries:
         quantity, sayable = entry.quantity, moving if entry.varies else dimensions
         if entry.alias:
@@ -146,7 +146,7 @@ def _quantities(mechanism: Numbers) -> Iterator[Finding]:
             yield Finding("is not used", f"dimensions.{name}", remedy, Severity.NOTE)
 
 
-def _dimensions(mechanism: Numbers, by_name: dict[str, Dimension | None]) -> Iterator[Finding]:
+def _dimensions(mechanism: Varying, by_name: dict[str, Dimension | None]) -> Iterator[Finding]:
     """Names of the dimensions and what each measures, which `by_name` receives."""
     dimensions = mechanism.dimensions
     by_name.update(dict.fromkeys(dimensions))
@@ -168,7 +168,7 @@ def _dimensions(mechanism: Numbers, by_name: dict[str, Dimension | None]) -> Ite
 # ---- links and hints ------------------------------------------------------------------------------------------
 
 
-def _links(mechanism: Numbers) -> Iterator[Finding]:
+def _links(mechanism: Varying) -> Iterator[Finding]:
     """Whether there are links and joints, one link is fixed, and each is joined to another."""
     jointed = {name for joint in mechanism.effective_joints.values() for name in joint.links}
     no_links = not mechanism.effective_links
@@ -187,7 +187,7 @@ def _links(mechanism: Numbers) -> Iterator[Finding]:
             yield Finding("inertia_about is given without an inertia", where, "", Severity.WARNING)
 
 
-def _hints(mechanism: Numbers) -> Iterator[Finding]:
+def _hints(mechanism: Varying) -> Iterator[Finding]:
     """Whether each hint of the assembly is of something that it can place."""
     moving = [link for link in mechanism.points if link != mechanism.fixed_link]
     for name, hint in mechanism.assembly.items():
@@ -212,7 +212,7 @@ def _hints(mechanism: Numbers) -> Iterator[Finding]:
 
 
 def check_values(
-    mechanism: Numbers, numbers: ParameterSet, changed: Collection[str] | None = None
+    mechanism: Varying, numbers: ParameterSet, changed: Collection[str] | None = None
 ) -> Iterator[Finding]:
     """Findings about the nominal values of a model whose names and units are sound.
 
@@ -270,7 +270,7 @@ def _unfollowed(numbers: ParameterSet) -> Iterator[Finding]:
             yield Finding("has no effect: no joint follows it", path, "remove it", Severity.NOTE)
 
 
-def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
+def _sides(mechanism: Varying, values: Values) -> Iterator[Finding]:
     """A link of two turning joints at one point has no length; a direction x along the axis counts no rotation."""
     spatial = mechanism.space == "spatial"
     geared = {joint for gear in mechanism.gears.values() for joint in gear.joints}  # a shaft with two passes on torque
@@ -296,7 +296,7 @@ def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
             yield Finding(what, f"links.{name}.points", "move one of them", severity)
 
 
-def _mass(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
+def _mass(mechanism: Varying, link: Link, values: Values, where: str) -> Iterator[Finding]:
     """Whether a body can be so: principal moments about its centre, each at most the sum of the others."""
     mass, letters = values[f"{where}.mass"], "xyz"[: mechanism.coordinates]
     gravity = [values.get(f"gravity.{axis}", np.nan) for axis in letters]

@@ -12,7 +12,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.joint_parts import has_play
 from trunnion.model.names import as_key
-from trunnion.model.parameters import Numbers, measured
+from trunnion.model.parameters import measured
 from trunnion.model.rules import faults, limit_findings, stray
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Cost, Variation
 from trunnion.model.tolerances import (
@@ -21,17 +21,10 @@ from trunnion.model.tolerances import (
     FULL_TURN,
     Price,
     Tolerance,
-    correlation,
-    cost_paths,
+    Varying,
     ends_motion,
-    further_entries,
     may_vary,
-    named_paths,
-    price,
-    tolerated,
     towards,
-    variations,
-    written_limits,
 )
 from trunnion.model.units import KINDS, Kind, UnitError, dimension_text, unit
 
@@ -45,7 +38,7 @@ WAYS = ("model", "process", "options")
 # ---- names ----------------------------------------------------------------------------------------------------
 
 
-def meant(mechanism: Numbers, section: str, names: Iterable[str]) -> tuple[dict[str, str], list[Finding]]:
+def meant(mechanism: Varying, section: str, names: Iterable[str]) -> tuple[dict[str, str], list[Finding]]:
     """The path of each name, and findings about names that mean no number, or the same one as another."""
     paths: dict[str, str] = {}
     findings: list[Finding] = []
@@ -63,7 +56,7 @@ def meant(mechanism: Numbers, section: str, names: Iterable[str]) -> tuple[dict[
     return paths, findings
 
 
-def tolerance_names(mechanism: Numbers) -> Iterator[Finding]:
+def tolerance_names(mechanism: Varying) -> Iterator[Finding]:
     """Whether each name is of a number that can vary, once, and distributions and costs get what they take."""
     entries = {entry.path: entry for entry in mechanism.entries}
     used = {name for entry in mechanism.entries for name in entry.quantity.names}
@@ -104,7 +97,7 @@ def tolerance_names(mechanism: Numbers) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _shape(mechanism: Numbers, variation: Any, where: str) -> Iterator[Finding]:
+def _shape(mechanism: Varying, variation: Any, where: str) -> Iterator[Finding]:
     """Whether the keys of a `Variation`, or of the defaults, are those of its distribution."""
     single = isinstance(variation, Variation)
     name = variation.distribution or mechanism.tolerance_defaults.distribution
@@ -124,15 +117,15 @@ def _shape(mechanism: Numbers, variation: Any, where: str) -> Iterator[Finding]:
 # ---- numbers --------------------------------------------------------------------------------------------------
 
 
-def tolerance_values(mechanism: Numbers) -> Iterator[Finding]:
+def tolerance_values(mechanism: Varying) -> Iterator[Finding]:
     """Findings about limits, distributions and correlations as numbers."""
-    for entry in further_entries(mechanism):
+    for entry in mechanism.further_entries:
         value = float(entry.quantity.evaluate(mechanism.parameter_set.dimension_values))
         if not np.isfinite(value):
             yield Finding(f"'{entry.quantity.source}' has no finite value ({value})", entry.where)
         yield from limit_findings(entry.rules, value, entry.kind, entry.where)
-    varied, limits = variations(mechanism), written_limits(mechanism)
-    for tolerance in tolerated(mechanism):
+    varied, limits = mechanism.variations_by_path, mechanism.tolerances()
+    for tolerance in mechanism.tolerated():
         name, variation = varied.get(tolerance.path, ("", Variation()))
         where = f"tolerances.{name}" if name else tolerance.path
         yield from _limits(mechanism, tolerance, variation, where)
@@ -143,7 +136,7 @@ def tolerance_values(mechanism: Numbers) -> Iterator[Finding]:
     yield from _correlations(mechanism)
 
 
-def _limits(mechanism: Numbers, tolerance: Tolerance, variation: Variation, where: str) -> Iterator[Finding]:
+def _limits(mechanism: Varying, tolerance: Tolerance, variation: Variation, where: str) -> Iterator[Finding]:
     """Whether limits and what a distribution was told make one."""
     path, lower, upper, half = tolerance.path, tolerance.lower, tolerance.upper, tolerance.half_width
     entries, options = mechanism.parameter_set.entries, dict[str, Any](tolerance.options)
@@ -177,13 +170,13 @@ def _limits(mechanism: Numbers, tolerance: Tolerance, variation: Variation, wher
         yield Finding(what, f"{where}.shift", "check its unit", Severity.WARNING)
 
 
-def _correlations(mechanism: Numbers) -> Iterator[Finding]:
+def _correlations(mechanism: Varying) -> Iterator[Finding]:
     """Whether each correlation is of several tolerated numbers, once, and all of them can be at the same time."""
-    vary = {item.path for item in tolerated(mechanism)}
+    vary = {item.path for item in mechanism.tolerated()}
     first: dict[frozenset[str], int] = {}
     for row, item in enumerate(mechanism.correlations):
-        where, paths = f"correlations.{row}", named_paths(mechanism, item.of)
-        fixed = [name for name in item.of if not vary.issuperset(named_paths(mechanism, [name]))]
+        where, paths = f"correlations.{row}", mechanism.named_paths(item.of)
+        fixed = [name for name in item.of if not vary.issuperset(mechanism.named_paths([name]))]
         yield from faults(
             where,
             *((True, "", f"'{name}' has no tolerance") for name in fixed),
@@ -194,20 +187,20 @@ def _correlations(mechanism: Numbers) -> Iterator[Finding]:
                 again = f"in entry {first[pair] + 1} already" if pair in first else "twice"
                 yield Finding(f"{' and '.join(sorted(pair))} is named {again}", where)
             first.setdefault(pair, row)
-    matrix = correlation(mechanism)
+    matrix = mechanism.correlation()
     if matrix.size and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
         what = f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}"
         yield Finding(f"{what}, below 0: it is not positive definite", "correlations", "reduce the coefficients")
 
 
-def cost_values(mechanism: Numbers) -> Iterator[Finding]:
+def cost_values(mechanism: Varying) -> Iterator[Finding]:
     """Whether each cost is of a tolerance or of a play, once, and its numbers make sense."""
     kinds = measured(mechanism, mechanism.entries)
-    tolerances = {tolerance.path: tolerance for tolerance in tolerated(mechanism)}
+    tolerances = {tolerance.path: tolerance for tolerance in mechanism.tolerated()}
     first: dict[str, str] = {}
     groups: dict[str, dict[str, list[Price]]] = {}
     for name, cost in mechanism.costs.items():
-        where, paths = f"costs.{name}", cost_paths(mechanism, name)
+        where, paths = f"costs.{name}", mechanism.cost_paths(name)
         if not paths:
             yield _unpriced(mechanism, name, where)
         for path in paths:
@@ -217,7 +210,7 @@ def cost_values(mechanism: Numbers) -> Iterator[Finding]:
             yield from _bought(mechanism, path, where, tolerances.get(path))
             faulty = [*_offered(cost, where, kinds.get(path), path)]
             try:
-                offers = [] if faulty else [price(mechanism, path, cost)]
+                offers = [] if faulty else [mechanism.price(path, cost)]
             except MechanismError as error:  # no grade of this size
                 offers = []
                 faulty.append(Finding(error.findings[0].what, f"{where}.process", "state options: {…} or a model"))
@@ -232,7 +225,7 @@ def cost_values(mechanism: Numbers) -> Iterator[Finding]:
         yield from _group(mechanism, name, members)
 
 
-def _bought(mechanism: Numbers, path: str, where: str, tolerance: Tolerance | None) -> Iterator[Finding]:
+def _bought(mechanism: Varying, path: str, where: str, tolerance: Tolerance | None) -> Iterator[Finding]:
     """Whether what a cost is of is a play that is modelled, or a tolerance that can be chosen."""
     _, name, *_ = path.split(".")
     joint, of_play = mechanism.effective_joints.get(name), path not in mechanism.parameter_set.entries
@@ -248,7 +241,7 @@ def _bought(mechanism: Numbers, path: str, where: str, tolerance: Tolerance | No
         yield Finding(what, where, "remove the cost", Severity.WARNING)
 
 
-def _unpriced(mechanism: Numbers, name: str, where: str) -> Finding:
+def _unpriced(mechanism: Varying, name: str, where: str) -> Finding:
     """Of a cost whose name is no number with a tolerance and no clearance."""
     joint = mechanism.effective_joints.get(name.removeprefix("joints.").removesuffix(".clearance"))
     if not name.endswith(".clearance") or joint is None:
@@ -284,7 +277,7 @@ def _offered(cost: Cost, where: str, kind: Kind | None, path: str) -> Iterator[F
     )  # fmt: skip
 
 
-def _group(mechanism: Numbers, name: str, members: Mapping[str, list[Price]]) -> Iterator[Finding]:
+def _group(mechanism: Varying, name: str, members: Mapping[str, list[Price]]) -> Iterator[Finding]:
     """The members of a group have one half width: each is priced by a formula, or all by the same choices."""
     every = [price for several in members.values() for price in several]
     choices = [{choice.name for choice in price.choices} for price in every]

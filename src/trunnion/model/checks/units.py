@@ -7,10 +7,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from trunnion.errors import Finding, Severity
-from trunnion.model.parameters import Entry, Numbers, ParameterSet
+from trunnion.model.parameters import Entry, ParameterSet
 from trunnion.model.parts import USUAL_PRESSURE_ANGLE
 from trunnion.model.quantity import Quantity
-from trunnion.model.tolerances import further_entries
+from trunnion.model.tolerances import Varying
 from trunnion.model.units import KINDS, NUMBER, Dimension, UnitError, unit
 
 __all__ = ["bare_number", "forgotten_units", "in_radians", "plain_angles", "thousands"]
@@ -22,12 +22,12 @@ LENGTH = KINDS["length"]
 # ---- plain lengths among others with a unit -------------------------------------------------------------------
 
 
-def forgotten_units(mechanism: Numbers) -> Iterator[Finding]:
+def forgotten_units(mechanism: Varying) -> Iterator[Finding]:
     """Plain lengths far above those with a unit: one warning, so that a file in mm without units is one finding.
 
     Where most lengths have a unit, far is more than the largest of them.
     """
-    entries = [entry for entry in (*mechanism.entries, *further_entries(mechanism))
+    entries = [entry for entry in (*mechanism.entries, *mechanism.further_entries)
                if entry.kind is LENGTH and not (entry.alias or entry.varies or ".values." in entry.path)
                and not entry.path.startswith("assembly.")]  # fmt: skip
     dimensions, names = mechanism.dimensions, mechanism.parameter_set.dimension_values
@@ -85,7 +85,7 @@ def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Find
 Sayable = Mapping[str, Dimension | None]  # what an expression may speak of, and what each measures
 
 
-def plain_angles(mechanism: Numbers, entries: Iterable[tuple[Entry, Sayable]]) -> Iterator[Finding]:
+def plain_angles(mechanism: Varying, entries: Iterable[tuple[Entry, Sayable]]) -> Iterator[Finding]:
     """What numbers without a unit mean that are taken as radians, of the rows of a table the largest.
 
     entries: with what their expressions may speak of. In a model without any unit all is in SI, and only many turns are

@@ -22,7 +22,6 @@ from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.checks.check import check_values
 from trunnion.model.parameters import measured
-from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.results.scales import extreme_place
@@ -196,7 +195,7 @@ def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
     refuse, or a length turn round, each name once."""
     study, mechanism = outcome.study, outcome.study.run.system.mechanism
     numbers, kinds = copy(mechanism.parameter_set), measured(mechanism, mechanism.parameter_set.entries.values())
-    names, paths_seen = variations(mechanism), set()
+    names, paths_seen = mechanism.variations_by_path, set()
     far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
     for tolerance in study.inputs.tolerances:
         values = np.atleast_1d(np.asarray(tolerance.options.get("values", 0.0)))

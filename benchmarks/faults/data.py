@@ -187,8 +187,8 @@ _MODEL = (
     Fault(
         "nesting-of-toml-off-by-one",
         "model/file.py",
-        "if _depth(data) > MAX_DEPTH:",
-        "if _depth(data) > MAX_DEPTH + 1:",
+        "if deep or _depth(data) > MAX_DEPTH:",
+        "if deep or _depth(data) > MAX_DEPTH + 1:",
         ("tests/model/test_file.py", "-k", "nest"),
     ),
     Fault(

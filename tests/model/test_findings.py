@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from model_samples import DURANGO, EXAMPLES, FOURBAR, RSSP, VARIED
+from model_samples import EXAMPLES, FOURBAR, RSSP, VARIED
 from ruamel.yaml import YAML
 
 from trunnion.errors import Finding, MechanismError, Severity

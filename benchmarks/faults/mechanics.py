@@ -23,9 +23,9 @@ _ALGEBRA = (
     ),
     Fault(
         "screw-log-near-half-a-turn",
-        "algebra/screw.py",
-        "versine = xp.where(obtuse, 1 - cosine, 1.0)",
-        "versine = xp.where(obtuse, 1 + cosine, 1.0)",
+        "algebra/lines.py",
+        "(yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz)",
+        "(yx - xy, xz - zx, zy + yz, 1 - xx - yy + zz)",
         ("tests/algebra/test_space.py",),
     ),
     Fault(
@@ -368,8 +368,8 @@ _MEASURES = (
     Fault(
         "dwell-counts-the-other-part",
         "algebra/panels.py",
-        "np.where(falls, spot - low, high - spot)",
-        "np.where(falls, high - spot, spot - low)",
+        "np.sum(np.diff(spots)[up])",
+        "np.sum(np.diff(spots)[~up])",
         ("tests/reference/test_kinematic_measures.py", "-k", "dwell"),
     ),
     Fault(

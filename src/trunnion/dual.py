@@ -1,16 +1,14 @@
 """Dual numbers a + ε b, ε² = 0, and what is made of them: derivatives, lines, poses, screws, dual matrices.
 
 A number: `Dual`, its functions `functions`; `seed`, `derivative`, `primal` for derivatives; `spatial`, `parts` for
-θ + ε s in space. Of three numbers: `vectors`, `lines`, `poses`, `screws`. Of stacks of matrices: `linalg`. On dual
-angles: `ccc`, the closed chain of four cylindrical pairs.
+θ + ε s in space. Of three numbers: `vectors`, and `lines` with poses and screws. Of stacks of matrices: `linalg`. On
+dual angles: `ccc`, the closed chain of four cylindrical pairs.
 """
 
 from __future__ import annotations
 
 from trunnion.algebra import duallinalg as linalg
-from trunnion.algebra import line as lines
-from trunnion.algebra import pose as poses
-from trunnion.algebra import screw as screws
+from trunnion.algebra import lines
 from trunnion.algebra import vector as vectors
 from trunnion.algebra.dual import Dual, derivative, functions, parts, primal, seed, spatial
 from trunnion.groups import ccc
@@ -23,9 +21,7 @@ __all__ = [
     "linalg",
     "lines",
     "parts",
-    "poses",
     "primal",
-    "screws",
     "seed",
     "spatial",
     "vectors",

@@ -53,12 +53,6 @@ def test_inverse_and_determinant(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_condition(n: int) -> None:
-    a = stack(n, 20 + n)
-    np.testing.assert_allclose(linalg.condition(rows_of(a)), np.linalg.cond(a), rtol=1e-9)
-
-
-@pytest.mark.parametrize("n", SIZES)
 def test_dual_solve(n: int) -> None:
     """x₀ = A⁻¹ b₀, x₁ = A⁻¹ (b₁ − B x₀)."""
     a = stack(n, 30 + n)
@@ -145,10 +139,19 @@ def same(found: Any, expected: Any, tolerance: float = TIGHT) -> None:
         np.testing.assert_allclose(part, np.broadcast_to(other, part.shape), rtol=0, atol=tolerance * scale)
 
 
+def times(*factors: Any) -> Dual:
+    """Â B̂ …: A B + ε (A B₁ + A₁ B)."""
+    real, dual = split(factors[0])
+    for other in factors[1:]:
+        second, slope = split(other)
+        real, dual = real @ second, real @ slope + dual @ second
+    return Dual(real, dual)
+
+
 def gives(factors: list[Any], expected: Any, tolerance: float = TIGHT) -> None:
     """The product is what is expected, to a tolerance relative to the largest sum of the sizes of its terms."""
-    found = dl.matmul(*factors)
-    sizes = dl.matmul(*(Dual(*(np.abs(part) for part in split(one))) for one in factors))
+    found = times(*factors)
+    sizes = times(*(Dual(*(np.abs(part) for part in split(one))) for one in factors))
     for part, other, size in zip(split(found), split(expected), split(sizes), strict=True):
         atol = tolerance * float(np.max(size))
         np.testing.assert_allclose(part, np.broadcast_to(other, part.shape), rtol=0, atol=atol)
@@ -195,8 +198,9 @@ def test_eigen(n: int) -> None:
     a = symmetric(n)
     values, vectors = dl.eigh(a)
     spread = Dual(*(part[..., None, :] * np.eye(n) for part in split(values)))
-    gives([vectors, spread, dl.transpose(vectors)], a)
-    gives([dl.transpose(vectors), vectors], np.eye(n))
+    back = Dual(*(np.swapaxes(part, -1, -2) for part in split(vectors)))
+    gives([vectors, spread, back], a)
+    gives([back, vectors], np.eye(n))
     same(values.dual, difference(np.linalg.eigvalsh, a), 1e-9)
 
 

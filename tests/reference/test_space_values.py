@@ -13,8 +13,8 @@ from brief import brief
 from reference.maximal_space import Array, Data, Frame, rotation, unrolled
 from spatial_numbers import apart
 from trunnion.algebra.dual import Dual, functions, parts, primal, spatial
-from trunnion.algebra.line import line
-from trunnion.algebra.pose import compose, inverse, link
+from trunnion.algebra.lines import line, link
+from trunnion.algebra.vector import product, transpose
 from trunnion.groups import GROUPS, ccc
 
 SPEED = 2.0
@@ -196,7 +196,7 @@ def test_a_chain_is_found_again_on_one_of_the_branches() -> None:
     """Angles and slides of chains made to close: Z₁X₁Z₂X₂Z₃X₃ is random, Z₄X₄Z(δ̂) undoes it, δ̂ belongs to θ̂₁."""
     rng = np.random.default_rng(8)
     angles, twists = turns(rng, 3), links(rng, 3)
-    back = inverse(compose(*(link(angle, twist) for angle, twist in zip(angles, twists, strict=True))))
+    back = transpose(product(*(link(angle, twist) for angle, twist in zip(angles, twists, strict=True))))
     x, y, z = back[0][2], back[1][2], back[2][2]
     fourth, rest = functions.arctan2(x, -y), functions.arctan2(back[2][0], back[2][1])
     twists.append(functions.arctan2(functions.sqrt(x * x + y * y), z))

@@ -58,7 +58,7 @@ class Dual:
         return self
 
     def __abs__(self) -> Dual:
-        magnitude: Dual = _abs(self)
+        magnitude: Dual = functions.abs(self)
         return magnitude
 
     def __add__(self, other: Any) -> Dual:
@@ -199,18 +199,11 @@ def _item(part: Any, index: Any, shape: tuple[int, ...]) -> Any:
 def _pair(x: Any, y: Any) -> tuple[Dual, Dual]:
     """Both as dual numbers of the same depth: the shallower one is constant for the outer ε."""
     depth_x, depth_y = _depth(x), _depth(y)
-    if depth_x < depth_y:
-        return _pair(Dual(x), y) if depth_x + 1 == depth_y else _pair(_lifted(x, depth_y), y)
-    if depth_y < depth_x:
-        return _pair(x, Dual(y)) if depth_y + 1 == depth_x else _pair(x, _lifted(y, depth_x))
+    for _ in range(depth_x, depth_y):
+        x = Dual(x)
+    for _ in range(depth_y, depth_x):
+        y = Dual(y)
     return x, y
-
-
-def _lifted(number: Any, depth: int) -> Dual:
-    while _depth(number) < depth:
-        number = Dual(number)
-    lifted: Dual = number
-    return lifted
 
 
 def _nonzero(number: Any) -> Any:
@@ -255,14 +248,6 @@ def _log(x: Any) -> Any:
     return Dual(_of(real).log(real), x.dual / real)
 
 
-def _abs(x: Any) -> Any:
-    return x * _of(primal(x)).sign(primal(x)) if isinstance(x, Dual) else _of(x).abs(x)
-
-
-def _sign(x: Any) -> Any:
-    return _of(primal(x)).sign(primal(x))  # piecewise constant: no dual part
-
-
 def _arctan2(y: Any, x: Any) -> Any:
     y, x = _pair(y, x) if isinstance(y, Dual) or isinstance(x, Dual) else (y, x)
     if not isinstance(y, Dual):
@@ -283,20 +268,9 @@ def _where(condition: Any, x: Any, y: Any) -> Any:
     condition = primal(condition)
     x, y = _pair(x, y) if isinstance(x, Dual) or isinstance(y, Dual) else (x, y)
     if not isinstance(x, Dual):
-        return np.where(condition, x, y) if _of(x) is np and _of(y) is np else _other(x, y).where(condition, x, y)
+        xp = _of(x) if _of(x) is not np else _of(y)
+        return xp.where(condition, x, y)
     return Dual(_where(condition, x.real, y.real), _where(condition, x.dual, y.dual))
-
-
-def _other(x: Any, y: Any) -> Any:
-    return _of(x) if _of(x) is not np else _of(y)
-
-
-def _minimum(x: Any, y: Any) -> Any:
-    return _where(~(primal(x) > primal(y)) & ~np.isnan(primal(y)), x, y)
-
-
-def _maximum(x: Any, y: Any) -> Any:
-    return _where(~(primal(x) < primal(y)) & ~np.isnan(primal(y)), x, y)
 
 
 def _on_real(name: str) -> Callable[..., Any]:
@@ -323,13 +297,13 @@ functions: SimpleNamespace = SimpleNamespace(
     log=_log,
     sqrt=_sqrt,
     square=lambda x: x * x,
-    abs=_abs,
-    sign=_sign,
+    abs=lambda x: x * _of(primal(x)).sign(primal(x)) if isinstance(x, Dual) else _of(x).abs(x),
+    sign=lambda x: _of(primal(x)).sign(primal(x)),  # piecewise constant: no dual part
     arctan2=_arctan2,
     hypot=_hypot,
     where=_where,
-    minimum=_minimum,
-    maximum=_maximum,
+    minimum=lambda x, y: _where(~(primal(x) > primal(y)) & ~np.isnan(primal(y)), x, y),
+    maximum=lambda x, y: _where(~(primal(x) < primal(y)) & ~np.isnan(primal(y)), x, y),
     isnan=_on_real("isnan"),
     isfinite=_on_real("isfinite"),
     zeros_like=_on_real("zeros_like"),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual
 
-__all__ = ["EQUAL", "Eigen", "eigh", "inverse", "matmul", "solve", "transpose"]
+__all__ = ["EQUAL", "Eigen", "eigh", "inverse", "solve"]
 
 Array = NDArray[np.float64]
 
@@ -28,24 +28,6 @@ class Eigen(NamedTuple):
 
     values: Dual
     vectors: Dual
-
-
-# ---- products -------------------------------------------------------------------------------------------------
-
-
-def transpose(a: Dual | Array) -> Dual:
-    """Âᵀ."""
-    real, dual = _split(a)
-    return Dual(real.swapaxes(-1, -2), dual.swapaxes(-1, -2))
-
-
-def matmul(a: Dual | Array, *others: Dual | Array) -> Dual:
-    """Â B̂ …: A B + ε (A B₁ + A₁ B)."""
-    real, dual = _split(a)
-    for other in others:
-        second, slope = _split(other)
-        real, dual = real @ second, real @ slope + dual @ second
-    return Dual(real, dual)
 
 
 # ---- systems --------------------------------------------------------------------------------------------------

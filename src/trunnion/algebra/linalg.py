@@ -16,10 +16,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero, plus
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = [
-    "condition", "cross", "determinant", "dot", "inverse", "solve", "solve_and_determinant",
-    "weighted",
-]  # fmt: skip
+__all__ = ["cross", "determinant", "dot", "inverse", "solve", "solve_and_determinant", "weighted"]
 
 Vector = tuple[Number, Number]
 Table = NDArray[np.float64]
@@ -68,7 +65,8 @@ def _solve(matrix: Sequence[Sequence[Number]], sides: Sequence[Sequence[Number]]
     if (table := _table(rows)) is not None:
         return _solve_table(table)
     xp = namespace(*(entry for row in rows for entry in row))
-    rows = _quiet(rows)
+    # Python's own numbers raise where NumPy's divide by zero quietly
+    rows = [[np.float64(entry) if isinstance(entry, (int, float)) else entry for entry in row] for row in rows]
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):
@@ -121,7 +119,8 @@ def _solve_table(table: Table) -> tuple[list[list[Number]], Number]:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):
             product = product * _pivot_rows(table, k) * table[k, k]
-            _clear_below(table, k)
+            factor = table[k + 1 :, k] / table[k, k]
+            table[k + 1 :, k + 1 :] -= factor[:, None] * table[k, k + 1 :]
         x = np.empty_like(table[:, n:])
         for i in reversed(range(n)):
             total = table[i, n:]
@@ -129,12 +128,6 @@ def _solve_table(table: Table) -> tuple[list[list[Number]], Number]:
                 total = total - table[i, j] * x[j]
             x[i] = total / table[i, i]
     return [[x[i, side] for i in range(n)] for side in range(table.shape[1] - n)], product
-
-
-def _clear_below(table: Table, k: int) -> None:
-    """Subtract row k from those below, so that nothing stays in column k."""
-    factor = table[k + 1 :, k] / table[k, k]
-    table[k + 1 :, k + 1 :] -= factor[:, None] * table[k, k + 1 :]
 
 
 def _pivot_rows(table: Table, k: int) -> Number:
@@ -155,11 +148,6 @@ def _pivot_rows(table: Table, k: int) -> Number:
         else:
             table[k, k:], table[i, k:] = np.where(swap, lower, upper), np.where(swap, upper, lower)
     return sign
-
-
-def _quiet(rows: list[list[Number]]) -> list[list[Number]]:
-    """Plain Python numbers as NumPy ones: those divide by zero quietly under errstate, Python's raise."""
-    return [[np.float64(entry) if isinstance(entry, (int, float)) else entry for entry in row] for row in rows]
 
 
 def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number:
@@ -191,15 +179,3 @@ def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
 def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
     return _solve(matrix, ())[1]
-
-
-def condition(matrix: Sequence[Sequence[Number]]) -> np.ndarray:
-    """2-norm condition number of each lane (∞ if singular, NaN where an entry is); real parts only."""
-    entries = np.broadcast_arrays(*(np.asarray(primal(entry), float) for row in matrix for entry in row))
-    n = len(matrix)
-    stack = np.stack(entries, axis=-1).reshape(*entries[0].shape, n, n)
-    bad = ~np.isfinite(stack).all(axis=(-2, -1))
-    values = np.linalg.svd(np.where(bad[..., None, None], 1.0, stack), compute_uv=False)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = values[..., 0] / values[..., -1]
-    return np.where(bad, np.nan, ratio)

@@ -45,7 +45,8 @@ ROUNDING = 1e-14
 TIED = 1e-7  # of its range: tops of which either may be the highest in mechanisms that differ by little
 ROUGH, NARROWED = 1e-7, 12  # last coefficients of a polynomial, of the others, and rounds in which it is narrowed
 CANCELLED = 1e-12  # of a mean of magnitudes: less than this is what rounding leaves of one that is zero
-NEWTONS, HALVINGS, LEADING, SETTLED = 5, 5, 8, 1e-3
+NEWTONS, LEADING, SETTLED = 5, 8, 1e-3
+DOUBLE = 1e-7  # imaginary part of a root that counts as real: of a double root it is the square root of rounding
 STILL = 1e-5  # step of Newton's method from where a course is level
 
 
@@ -175,7 +176,8 @@ def extreme(
     place: Number = np.where(constant, -1.0, middle + width * spot)
     # one that is not level goes on rising beside its panel: only what is as high but for rounding counts there
     slack = np.where(level, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
-    first[finite_rows] = _first(lane, value >= most[lane] - slack)
+    good = np.flatnonzero(value >= most[lane] - slack)  # all these lanes have one
+    first[finite_rows] = good[np.append(True, np.diff(lane[good]) > 0)] if len(good) else good
     pick = first
     if isinstance(pairs, Dual):
         slopes = np.broadcast_to(derivative(_fitted(pairs, of, sign, middle, width)), rows.shape)
@@ -203,12 +205,6 @@ def _picked(array: Array, pick: NDArray[np.intp], finite: NDArray[np.bool_]) -> 
     values = np.full(len(pick), np.nan)
     values[finite] = array[pick[finite]]
     return values
-
-
-def _first(lane: NDArray[np.intp], good: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """The first good entry of each lane; all lanes have one."""
-    entries = np.flatnonzero(good)
-    return np.asarray(entries[np.append(True, np.diff(lane[entries]) > 0)] if len(entries) else entries)
 
 
 def _fitted(pairs: Number, of: Made, sign: float, middle: Array, width: Array) -> Number:
@@ -276,60 +272,25 @@ def above(coefficients: Number, level: float) -> Number:
     """How much of every panel, of the length 2 of its spots, a number, (lane, panel, coefficient), is above a level."""
     shifted = coefficients - level * (np.arange(ORDER) == 0)
     real = np.asarray(primal(shifted))
-    values: Array = real @ ON_GRID
-    up = values >= 0.0
-    share = CELL * np.sum(up[..., 1:] & up[..., :-1], axis=-1).astype(float)
-    moved = np.zeros(share.shape)
-    for lane, panel, low, high, full in _crossings(real, values, up):
-        spot = _crossed(real[lane, panel], low, high)
-        falls = up_at(real[lane, panel], low)
-        np.add.at(share, (lane, panel), np.where(falls, spot - low, high - spot) - full)
-        if isinstance(shifted, Dual):
-            slope = np.abs(_at(real[lane, panel] @ RATE, spot))
-            np.add.at(moved, (lane, panel), _at(np.broadcast_to(shifted.dual, real.shape)[lane, panel], spot) / slope)
-    share = np.where(np.any(np.isnan(values), axis=-1), np.nan, share)
+    slopes = np.broadcast_to(derivative(shifted), real.shape)
+    share, moved = np.where(real[..., 0] >= 0.0, 2.0, 0.0), np.zeros(real.shape[:-1])
+    for place in zip(*np.nonzero(np.abs(real[..., 0]) <= np.sum(np.abs(real[..., 1:]), axis=-1)), strict=True):
+        series, inner = real[place], _roots(real[place])
+        spots = np.concatenate([[-1.0], inner, [1.0]])
+        up = chebyshev.chebval((spots[1:] + spots[:-1]) / 2, series) >= 0.0
+        share[place] = np.sum(np.diff(spots)[up])
+        passed = inner[up[1:] != up[:-1]]
+        rates = np.abs(chebyshev.chebval(passed, series @ RATE))
+        moved[place] = np.sum(chebyshev.chebval(passed, slopes[place]) / np.where(rates > 0.0, rates, np.nan))
+    share = np.where(np.any(np.isnan(real), axis=-1), np.nan, share)
     return Dual(share, moved) if isinstance(shifted, Dual) else share
 
 
-def up_at(coefficients: Array, spot: Array) -> NDArray[np.bool_]:
-    """Whether polynomials are above 0 at their spots."""
-    return _at(coefficients, spot) >= 0.0
-
-
-def _crossings(real: Array, values: Array, up: NDArray[np.bool_]) -> Any:
-    """Lane, panel, and two spots between which a number passes 0 once; how much of that is counted as above it.
-
-    Between two places of the grid, or on either side of a place at which it turns back on the other side of 0.
-    """
-    lane, panel, cell = np.nonzero(up[..., 1:] != up[..., :-1])
-    yield lane, panel, GRID[cell], GRID[cell + 1], np.zeros(len(lane))
-    sizes = np.abs(values)
-    turning = (sizes[..., 1:-1] <= sizes[..., :-2]) & (sizes[..., 1:-1] <= sizes[..., 2:])
-    turning &= (up[..., 1:-1] == up[..., :-2]) & (up[..., 1:-1] == up[..., 2:])
-    turning &= sizes[..., 1:-1] < np.max(np.abs(np.diff(values)), axis=-1, keepdims=True)
-    lane, panel, middle = np.nonzero(turning)
-    if len(lane):
-        signs = np.where(up[lane, panel, middle + 1], -1.0, 1.0)
-        width = np.full(len(lane), CELL)
-        spot, most, _ = _top(
-            signs[:, None] * _fitted(real[None, lane, panel], lambda rows: rows[0], 1.0, GRID[middle + 1], width)
-        )
-        turned = most > 0.0
-        lane, panel, middle, spot, signs = lane[turned], panel[turned], middle[turned], spot[turned], signs[turned]
-        place, counted = GRID[middle + 1] + CELL * spot, np.where(signs < 0.0, 1.0, 0.0)
-        yield lane, panel, GRID[middle], place, counted * (place - GRID[middle])
-        yield lane, panel, place, GRID[middle + 2], counted * (GRID[middle + 2] - place)
-
-
-def _crossed(coefficients: Array, low: Array, high: Array) -> Array:
-    """Where polynomials pass 0 between two spots."""
-    before = up_at(coefficients, low)
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        same = up_at(coefficients, middle) == before
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    spot = 0.5 * (low + high)
-    for _ in range(NEWTONS):
-        slope = _at(coefficients @ RATE, spot)
-        spot = np.clip(spot - _at(coefficients, spot) / np.where(slope == 0.0, np.inf, slope), low, high)
-    return spot
+def _roots(series: Array) -> Array:
+    """Where a polynomial passes or touches 0 inside its panel, rising."""
+    trimmed = chebyshev.chebtrim(series, ROUNDING * np.max(np.abs(series)))
+    roots = chebyshev.chebroots(trimmed) if len(trimmed) > 1 else np.zeros(0)
+    spots = np.sort(np.real(roots[(np.abs(np.imag(roots)) <= DOUBLE) & (np.abs(np.real(roots)) < 1.0)]))
+    slope = chebyshev.chebval(spots, series @ RATE)
+    step = chebyshev.chebval(spots, series) / np.where(slope == 0.0, np.inf, slope)
+    return np.sort(np.clip(spots - np.clip(step, -DOUBLE, DOUBLE), -1.0, 1.0))

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import parts, primal
+from trunnion.algebra.lines import link, turn_x
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.pose import compose, inverse, link, transform, turn_x
-from trunnion.algebra.vector import Vector3, apply, cross, dot, length, plus, scaled, transpose
+from trunnion.algebra.vector import Vector3, apply, cross, dot, length, plus, product, scaled, transpose
 from trunnion.groups.dyad import root
 
 __all__ = ["BRANCHES", "Loop", "closure", "condition", "meet", "position", "rates"]
@@ -72,10 +72,10 @@ def position(first: Number, twists: Sequence[Number], branch: int) -> Loop:
     axis: Vector3 = (0.0, 0.0, 1.0)
     before = link(first, twists[0])
     home = turn_x(twists[3])
-    b, d = transform(before, axis), transform(inverse(home), axis)
+    b, d = apply(before, axis), apply(transpose(home), axis)
     c = meet(b, d, twists[1], twists[2], branch)
     second = _turn(apply(transpose(before), c), twists[1])
-    third = _turn(apply(transpose(compose(before, link(second, twists[1]))), d), twists[2])
+    third = _turn(apply(transpose(product(before, link(second, twists[1]))), d), twists[2])
     x, y, z = apply(home, c)  # Z(θ̂₄)ᵀ X(α̂₃)ᵀ ẑ = (sin θ̂₄ sin α̂₃, cos θ̂₄ sin α̂₃, cos α̂₃)
     return Loop((first, second, third, _turn((x, -y, z), twists[2])), (b, c, d))
 
@@ -101,8 +101,8 @@ def rates(axes: tuple[Vector3, Vector3, Vector3], twist: Vector3) -> Vector3:
 
 def closure(loop: Loop, twists: Sequence[Number]) -> tuple[Number, Number]:
     """By how much a loop misses closing: the largest entry of the product less I, real and dual part; rad, m."""
-    product = compose(*(link(angle, twist) for angle, twist in zip(loop.angles, twists, strict=True)))
-    gaps = [parts(entry - (1.0 if i == j else 0.0)) for i, row in enumerate(product) for j, entry in enumerate(row)]
+    closed = product(*(link(angle, twist) for angle, twist in zip(loop.angles, twists, strict=True)))
+    gaps = [parts(entry - (1.0 if i == j else 0.0)) for i, row in enumerate(closed) for j, entry in enumerate(row)]
     real, dual = (np.broadcast_arrays(*map(primal, half)) for half in zip(*gaps, strict=True))
     return np.max(np.abs(real), axis=0), np.max(np.abs(dual), axis=0)
 

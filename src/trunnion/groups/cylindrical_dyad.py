@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trunnion.algebra.line import dual_angle, line
+from trunnion.algebra.lines import dual_angle, line
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import Frame, compose, relative, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled, unit, vector_parts

@@ -24,8 +24,8 @@ from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.nested import flat
 from trunnion.errors import Severity
-from trunnion.solve.assembly import hints
 from trunnion.solve.assembly_modes import GroupModes, choices, put_together
+from trunnion.solve.hints import hints
 from trunnion.solve.run import prepare
 from trunnion.views.assembly.modes import places
 

@@ -15,8 +15,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve.change_points import TOUCHING
 from trunnion.solve.run import Run
+from trunnion.solve.track import TOUCHING
 
 __all__ = ["check_start", "refuse", "refuse_massless", "refuse_undetermined"]
 

@@ -17,8 +17,8 @@ import numpy as np
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
+from trunnion.solve.change_points import folds
 from trunnion.solve.forward import Forward, Motion
-from trunnion.solve.onward import folds
 from trunnion.solve.run import Run
 from trunnion.solve.track import Track
 

@@ -21,8 +21,8 @@ from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics, Rates
 from trunnion.dynamics.start import Places, load_times
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
-from trunnion.solve.change_points import carried_on
 from trunnion.solve.system import felt
+from trunnion.solve.track import carried_on
 
 __all__ = ["CYCLES", "FINEST", "Bridged", "bridged", "integration_of"]
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
-from trunnion.solve.assembly import grid, joint_rows, way_name, ways_of
+from trunnion.solve.assembly import grid, ways_of
 from trunnion.solve.forward import Forward, posed
+from trunnion.solve.hints import joint_rows, way_name
 from trunnion.solve.run import Run
 from trunnion.solve.track import Passing, Track
 

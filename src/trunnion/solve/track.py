@@ -17,13 +17,12 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
 from trunnion.groups.tree import Tree
-from trunnion.solve.change_points import TOUCHING, carried_on
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "GUESSES", "SEED", "Assemblies", "Follower", "Passing", "Track", "TrackClock", "alternating", "at", "closed_at",
-    "each_once", "extent", "guess_reaches", "key_of", "lane_of",
+    "GUESSES", "SAME", "SEED", "TOUCHING", "Assemblies", "Follower", "Passing", "Track", "TrackClock", "alternating",
+    "at", "carried_on", "closed_at", "each_once", "extent", "guess_reaches", "key_of", "lane_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -31,8 +30,7 @@ Places = NDArray[np.intp]  # positions of the grid
 Elements = Sequence[Any]  # per joint: both its elements, as nested tuples of numbers
 
 GUESSES = 512
-FEW = 16  # guesses at each place where an assembly is looked for again
-PROBES = 96  # such places in the gaps of a track
+TOUCHING = 1e-6  # of 1/condition: below it two assemblies meet
 MOST_CONDITION = 1e6  # of an assembly that counts: in those above, two may meet
 SAME = 1e-6  # of what tells assemblies apart: nearer ones are one
 SEED = 20060704  # of the guesses: the same assemblies every time
@@ -57,6 +55,12 @@ class Assemblies(NamedTuple):
     closed: NDArray[np.bool_]
     q: Array
     key: Array
+
+    def full(self) -> Any:
+        """The pose with its frames and orientation in every lane."""
+        shape = self.closed.shape
+        frames = each(self.pose.frames, lambda n: np.broadcast_to(primal(n), shape))
+        return self.pose._replace(frames=frames, orientation=np.broadcast_to(self.pose.orientation, shape))
 
 
 def closed_at(
@@ -259,52 +263,12 @@ class Follower:
         solved = np.array([np.broadcast_to(pose.q[i], shape) for i in self.group.kept])
         return solved, np.broadcast_to(pose.orientation, shape) == self.orientation
 
-    def revisit(self, rows: Array, periodic: bool) -> Places:
-        """Fill the parts of the gaps in which the group can be assembled again, as far as the probes find them.
-
-        A range that reaches into what is known belongs to another assembly of the same sense and is left out.
-        Returns the positions that were filled, in order.
-        """
-        gaps = ~np.isfinite(rows[0])
-        places = np.flatnonzero(gaps)
-        if len(places) in (0, len(gaps)):
-            return places[:0]
-        probes = places[np.unique(np.linspace(0, len(places) - 1, min(len(places), PROBES)).astype(np.intp))]
-        solved = closed_at(self.group, self.elements, self.drive, probes, FEW)
-        right = solved.closed & (np.broadcast_to(solved.pose.orientation, solved.closed.shape) == self.orientation)
-        left_out: list[Array] = []  # what tells them from others at the probes, (entry, probe)
-        for k, probe in enumerate(probes):
-            lanes = k * FEW + np.flatnonzero(right[k * FEW : (k + 1) * FEW])
-            if np.isfinite(rows[0, probe]) or not len(lanes):
-                continue
-            filled = np.flatnonzero(np.isfinite(rows[0]))
-            before = rows[:, filled[np.argmin(np.abs(filled - probe))]]
-            lane = lanes[np.argmin(self._away(solved.q[:, lanes], before))]
-            if any(np.max(np.abs(solved.key[:, lane] - other[:, k])) <= SAME for other in left_out):
-                continue  # to follow it again would end as before
-            fresh = np.full_like(rows, np.nan)
-            fresh[:, probe] = solved.q[:, lane]
-            self.both_ways(fresh, int(probe), periodic)
-            filled = np.isfinite(fresh[0])
-            if np.any(filled & np.isfinite(rows[0])):
-                left_out.append(self.keys(fresh[:, probes], probes))
-            else:
-                rows[:, filled] = fresh[:, filled]
-        return np.flatnonzero(gaps & np.isfinite(rows[0]))
-
     def keys(self, rows: Array, places: Places) -> Array:
         """What tells the assembly from others at some positions, (entry, place)."""
-        pose = self.group.position(at(self.elements, places), list(rows), [lane_of(n, places) for n in self.drive])
-        numbers = key_of(self.group, pose, extent(self.group, self.elements))
+        elements = at(self.elements, places)
+        pose = self.group.position(elements, list(rows), [lane_of(n, places) for n in self.drive])
+        numbers = key_of(self.group, pose, extent(self.group, elements))
         return np.array([np.broadcast_to(n, places.shape) for n in numbers])
-
-    def _away(self, q: Array, before: Array) -> Array:
-        """How far coordinates (kept, lane) are from others, turns and slides counted against their sizes."""
-        kinds = np.array(self.group.kept_kinds)[:, None]
-        change = q - before[:, None]
-        turned = np.arctan2(np.sin(change), np.cos(change))
-        size = np.where(kinds == "slide", extent(self.group, self.elements), 1.0)
-        return np.asarray(np.sum(np.where(kinds == "turn", turned, change / size) ** 2, axis=0))
 
 
 def _leading(good: NDArray[np.bool_]) -> int:
@@ -347,10 +311,9 @@ class Track:
     """Free tree coordinates of a general group along the nominal cycle, and the sign of det J on its branch.
 
     times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled. turns: rotations, whole
-    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: places in
-    the grid where it was put together anew after it had come apart. ways: frames of its links in every assembly found
-    at the time `begin`, s, in the order of their names; taken: which of them is followed. passed: times of change
-    points, s, at which det J changes its sign on the smooth way on.
+    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. ways: frames of its
+    links in every assembly found at the time `begin`, s, in the order of their names; taken: which of them is followed.
+    passed: times of change points, s, at which det J changes its sign on the smooth way on.
     """
 
     times: Array
@@ -359,7 +322,6 @@ class Track:
     periodic: bool
     clock: TrackClock
     turns: Mapping[int, Array]
-    again: Places
     begin: float = 0.0
     ways: tuple[Any, ...] = ()
     taken: int = 0
@@ -455,6 +417,13 @@ class Passing:
     def pose(self, group: Any, elements: Sequence[Any], drive: Sequence[Number], walk: Forward, time: Number) -> Any:
         """Pose in the assembly in which the links then are."""
         return group.position(elements, self.branch(primal(self.clock.nominal(walk, time))), drive)
+
+
+def carried_on(times: Array, rows: Array, time: float) -> Array:
+    """Numbers at a time, (row,), by the polynomial through some times, rows (row, time)."""
+    apart = times[:, None] - times[None] + np.eye(len(times))
+    ahead = np.where(np.eye(len(times), dtype=bool), 1.0, (time - times)[None] / apart)
+    return np.asarray(rows @ np.prod(ahead, axis=1))
 
 
 def alternating(passed: Sequence[float], moment: Number) -> Number:

@@ -39,8 +39,9 @@ from trunnion.groups.tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve import shifts
-from trunnion.solve.assembly import Chosen, choose, distance
+from trunnion.solve.assembly import Chosen, choose
 from trunnion.solve.forward import posed, start
+from trunnion.solve.hints import distance
 from trunnion.solve.space.determinacy import look
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates
 from trunnion.solve.track import GUESSES, SEED, guess_reaches

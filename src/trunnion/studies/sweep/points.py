@@ -31,10 +31,10 @@ from trunnion.model.checks.check import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
 from trunnion.solve import change_points
-from trunnion.solve.assembly import distance, grid, hints, named_way
-from trunnion.solve.drawn import hinted_at
+from trunnion.solve.assembly import grid
 from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.hints import distance, hinted_at, hints, named_way
 from trunnion.solve.loads import closes
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms

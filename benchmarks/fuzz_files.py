@@ -157,7 +157,7 @@ def data(path: Path, rng: Random) -> Iterator[None]:
 def rig(path: Path, rng: Random) -> Iterator[None]:
     """A rig put to the model that it is for."""
     import trunnion
-    from trunnion.rig.reading.rig_file import Rig
+    from trunnion.rig.virtual.rig_file import Rig
 
     stated = Rig.read(path)
     if len(stated.schedule.rows()) <= FEW:

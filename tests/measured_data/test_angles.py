@@ -188,7 +188,7 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
     (warm,) = read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}}).conditions
     with pytest.raises(MechanismError, match="'K' is not one of mechanics \\(in condition misalignment 15 degC\\)"):
         in_condition(trunnion.read("examples/pezzuti-cardan.yaml"), warm)
-    with pytest.raises(MechanismError, match="has a tolerance, which has no effect here"):
+    with pytest.raises(MechanismError, match="± 1 deg"):
         read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 
 
@@ -215,7 +215,7 @@ def test_a_counter_that_is_set_back_is_refused(clean: Columns, tmp_path: Path) -
     """What follows has no zero."""
     counts = clean["encoder"].copy()
     counts[6000:] -= counts[6000]
-    with pytest.raises(MechanismError, match=r"is set back 1 time, at 1.1998 s, .* to 0 — state wrap"):
+    with pytest.raises(MechanismError, match=r"is set back 1 time, at 1.1998 s — state wrap"):
         read({**clean, "encoder": counts}, tmp_path)
 
 
@@ -297,7 +297,7 @@ TOLD: list[tuple[dict[str, Any], set[str], str]] = [
     ({"angle/per_turn": 30}, {"data.rate.ratio"}, "1200 rpm, 2 times what 'speed-in' reads"),
     ({"angle/sign": -1, "channels/torque-in/zero": "50 mV"}, {"data.rate.ratio"}, "-600 rpm, -1 times"),
     ({"angle/index": {"column": "none"}}, {"data.index.none"}, "has no pulse"),
-    ({"angle/index": {"column": "z"}, "angle/per_turn": 59}, {"data.pulses.per_turn", "data.pulses.lost"}, "counts 60"),
+    ({"angle/index": {"column": "z"}, "angle/per_turn": 59}, {"data.pulses.lost"}, "usual are 60 a turn"),
     ({"angle": {"from": "column", "column": "angle [°]", "unit": "rad"}}, {"data.unit.differs"}, "57.3 times"),
     ({"angle": {"from": "column", "column": "angle [°]", "unit": "deg"}}, set(), ""),
 ]

@@ -105,9 +105,7 @@ def test_an_angle_that_counts_backwards(tmp_path: Path, stated: Any) -> None:
     assert "data.power.sign" in {one.code for one in data.findings}
     model = trunnion.Mechanism.model_validate(FOUR_BAR)
     if stated == "60 rpm":
-        with pytest.raises(
-            MechanismError, match="backwards: -60 rpm measured, 60 rpm stated of A — if it does turn so"
-        ):
+        with pytest.raises(MechanismError, match="-60 rpm measured, 60 rpm stated of A"):
             trunnion.rig.compare(model, data)
     else:
         assert "residual" in trunnion.rig.compare(model, data)

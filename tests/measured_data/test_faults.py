@@ -79,8 +79,8 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
     (_stuck, "channels.torque-in", ("stuck: 399 readings", "at 1.0002 s"), "sensor"),
     (_drift, "channels.torque-in", ("drift", "N m in 1.8 s"), "drift: remove"),
     (_gap, "time", ("1 gap", "300 samples missing", "0.0602 s at 0.9998 s"), "buffer"),
-    (_repeated, "time", ("2 rows of 11,000 left out: their time does not rise, at 1, 1 s",), "logger"),
-    (_blank, "time", ("5 rows of 11,000 left out: no time in them",), "logger"),
+    (_repeated, "time", ("2 rows of 11,000 left out", "does not rise, at 1, 1 s"), "logger"),
+    (_blank, "time", ("5 rows of 11,000 left out: 5 have no time",), "logger"),
     (_backward, "time", ("100 rows", "backward 1 time", "0.0198 s"), "split the file"),
     (_unsteady, "turns", ("speed is not steady",), "over:"),
 ]

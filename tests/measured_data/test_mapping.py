@@ -96,7 +96,7 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"time": {"rate": "0 Hz"}}, "time.rate", "not a frequency above zero"),
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
     ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a", "one of mean and column"),
-    ({"set": {"a": "2 * AB"}}, "set.a", "refers to AB"),
+    ({"set": {"a": "2 * AB"}}, "set.a", "'* AB' is not known"),
     ({"cycle": "3 N"}, "cycle", "no angle and no time above zero"),
     ({"cycle": 0}, "cycle", "no angle and no time above zero"),
     ({"cycle": "-1 turn"}, "cycle", "no angle and no time above zero"),

@@ -59,9 +59,9 @@ def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
     per_turn, samples = 360, 20_000
     time = STEP * np.arange(samples)
     true = (per_sample * np.arange(samples) + 0.37) / per_turn
-    table = DataTable("run.csv", {"n": Column(np.floor(true * per_turn), "", 0, "")})
+    table = DataTable({"n": Column(np.floor(true * per_turn), "", 0, "")})
     source = AngleSource(**{"from": "pulses"}, column="n", per_turn=per_turn)
-    line = Timeline(time, None, STEP, np.empty(0, np.intp))
+    line = Timeline(time, slice(None), STEP)
     found = coordinate(source, table, line, None, lambda finding: None).values / (2 * np.pi)
     off = (found - true)[2000:-2000] * per_turn
     assert np.std(off) < 0.03

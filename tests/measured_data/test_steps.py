@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from measured_data.four_bar import rocker
-from trunnion.rig.reading import turns
+from trunnion.rig.reading import steps
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.turns import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
+from trunnion.rig.reading.steps import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
 
 Array = NDArray[np.float64]
 
@@ -100,8 +100,8 @@ def test_turns_that_are_sampled_at_the_same_places(tmp_path: Path, rpm: float, n
 
 def test_turns_shorter_than_half_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     """Readings ±½ in turn scatter by ½: row differences of ±1 have √(1/2) = σ, and steps take 1/12 of its square."""
-    monkeypatch.setattr(turns, "in_step", lambda *_: 1.0)
+    monkeypatch.setattr(steps, "in_step", lambda *_: 1.0)
     rows, times = np.ones(100, dtype=bool), np.arange(10.0)
     short: Any = SimpleNamespace(begin=times, end=times + 0.2, line=SimpleNamespace(step=1.0), rows=rows, window=rows)
-    left = turns.left_in_turns(short, np.zeros((10, 4)), np.arange(100) % 2 - 0.5, 0.0)
+    left = steps.left_in_turns(short, np.zeros((10, 4)), np.arange(100) % 2 - 0.5, 0.0)
     assert left.noise == pytest.approx((1 / 2 - 1 / 12) ** 0.5, rel=1e-3)

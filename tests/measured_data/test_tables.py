@@ -183,10 +183,10 @@ def test_variables_of_netcdf(tmp_path: Path, engine: Any) -> None:
     assert found["t"].values.tolist() == [0.0, 1.0, 2.0]
     assert found["row"].values.tolist() == [10.0, 20.0, 30.0]
     assert {name: column.unit for name, column in found.items()} == {"T": "N m", "since": "s", "t": "ms", "row": ""}
-    for name, told in (("map", "'map' row 3 × place 2"), ("level", "'level' none"), ("other", "'other' far 3")):
-        with pytest.raises(MechanismError, match=rf"not all of one dimension.*'T' row 3, {told}"):
+    for name, told in (("map", "map .*'place': 2"), ("level", "level {}"), ("other", "other {'far': 3}")):
+        with pytest.raises(MechanismError, match=rf"not all of one dimension.*T {{'row': 3}}, {told}"):
             read_table(path, ["T", name])
-    with pytest.raises(MechanismError, match=r"is not NetCDF that can be read: .*never"):
+    with pytest.raises(MechanismError, match=r"is not .nc that can be read: .*never"):
         read_table(path, ["odd"])
     with pytest.raises(MechanismError, match=r"there is no column 'n'; the file has .*'level'"):
         read_table(path, ["n"])
@@ -202,10 +202,10 @@ BAD: dict[str, tuple[str, bytes, str]] = {
     "far below": ("a.csv", b"t,T1\n" + b"0,1\n" * 500 + b"1,2,3\n", "has 3 cells instead of 2"),
     "binary": ("a.csv", b"\x00\x01\x02PK", "is not a text file"),
     "no line end": ("a.csv", b"1;" * (1 << 24), "no end of a line in 16 MiB"),
-    "not parquet": ("a.parquet", b"t,T1\n0,1\n", "is not Parquet"),
-    "not tdms": ("a.tdms", b"t,T1\n0,1\n" * 20, "is not TDMS"),
-    "not netcdf": ("a.nc", b"t,T1\n0,1\n", "is not NetCDF that can be read"),
-    "no classic netcdf": ("a.nc", b"CDF,T1\n0,1\n", "is not NetCDF that can be read"),
+    "not parquet": ("a.parquet", b"t,T1\n0,1\n", "is not .parquet that can be read"),
+    "not tdms": ("a.tdms", b"t,T1\n0,1\n" * 20, "is not .tdms that can be read"),
+    "not netcdf": ("a.nc", b"t,T1\n0,1\n", "cannot be read"),
+    "no classic netcdf": ("a.nc", b"CDF,T1\n0,1\n", "is not .nc that can be read"),
     "extension": ("a.xlsx", b"PK", "the extension '.xlsx' is not one of a data file"),
     "twice": ("a.csv", b"t,T1,T1\n0,1,2\n", "the column 'T1' stands there 2 times"),
     "missing": ("a.csv", b"t,T2,n\n0,1,2\n", "there is no column 'T1'; the file has 't', 'T2', 'n'"),

@@ -71,7 +71,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     code, out, err = program("data", "rig.json", "a.csv", "b.csv")
     assert code == 1
     assert "beta 15 deg" in out  # the other condition has its file for a name
-    assert err.startswith("b.csv: warning: channels.brake: sign: the power out at brake is negative in 19 of 19 turns")
+    assert err.startswith("b.csv: warning: channels.brake: sign: the power of load:brake is negative in 19 of 19 turns")
     pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)
     code, out, err = program("data", "rig.json", "a.csv", "b.csv", "--out", "c.csv")
     assert (code, out) == (2, "")

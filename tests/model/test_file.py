@@ -26,7 +26,7 @@ from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.rewrite import rewrite_mechanism
 from trunnion.model.schema import SCHEMA_FILE, json_schema, schema_text
 from trunnion.rig.reading.mapping import read_mapping
-from trunnion.rig.reading.rig_file import Rig
+from trunnion.rig.virtual.rig_file import Rig
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 

@@ -10,7 +10,7 @@ import pytest
 
 import trunnion
 from trunnion.rig.identification.fit import corners
-from trunnion.rig.reading.rig_file import Rig
+from trunnion.rig.virtual.rig_file import Rig
 
 GUIDE = "S.friction.coefficient"
 TRUE = 0.08

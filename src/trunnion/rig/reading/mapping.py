@@ -19,53 +19,17 @@ from trunnion.model.entry import Name, Part, forms, problem
 from trunnion.model.file import Lines, place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
-from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.schema import SchemaGenerator
-from trunnion.model.units import ANGLE, KINDS, UnitError
+from trunnion.model.units import UnitError
 from trunnion.rig.reading import units
 
 __all__ = [
-    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime",
-    "FromData", "Mapped", "Pulses", "TimeBase", "Zero", "read_mapping", "schema_text",
+    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FromData", "Mapped", "Pulses", "TimeBase",
+    "Zero", "read_mapping", "schema_text",
 ]  # fmt: skip
 
 Sign = Literal[1, -1]
 Pulses = Annotated[int, Field(ge=1, le=10_000_000)]  # of a turn
-PLAIN_ZERO = units.Amount(0.0, 0.0, "", {})
-
-
-def fixed(quantity: Quantity) -> Quantity:
-    """A number with its unit; there are no dimensions here that an expression could speak of."""
-    if quantity.names:
-        what = f"'{quantity.source}' refers to {', '.join(quantity.names)}"
-        raise problem(what, "write a number with its unit")
-    if quantity.tolerance is not None:
-        raise problem(f"'{quantity.source}' has a tolerance, which has no effect here", "write the value alone")
-    return quantity
-
-
-FixedAngle = Annotated[Angle, AfterValidator(fixed)]
-FixedNumber = Annotated[Dimensionless, AfterValidator(fixed)]
-FixedRate = Annotated[Rate, AfterValidator(fixed)]
-FixedTime = Annotated[Time, AfterValidator(fixed)]
-FixedQuantity = Annotated[AnyQuantity, AfterValidator(fixed)]
-
-
-def _of_unit(si: str, example: str) -> AfterValidator:
-    """Units, and amounts with one, that measure the same as that of SI."""
-
-    def check(entry: Any) -> Any:
-        text = entry.unit if isinstance(entry, units.Amount) else entry
-        if text and not units.alike(units.dimensions(text)[1], units.dimensions(si)[1]):
-            raise problem(f"the unit '{text}' is not {example}", f"write {example}")
-        return entry
-
-    return AfterValidator(check)
-
-
-Moment = Annotated[units.Number, _of_unit("s", "a unit of time such as ms")]
-TimeUnit = Annotated[units.UnitText, _of_unit("s", "a unit of time such as ms")]
-AngleUnit = Annotated[units.UnitText, _of_unit("rad", "a unit of angle such as deg")]
 
 
 def _ordered(span: tuple[units.Amount, units.Amount]) -> tuple[units.Amount, units.Amount]:
@@ -81,7 +45,7 @@ def _spans(value: object) -> object:
     return [value] if single else value
 
 
-Span = Annotated[tuple[Moment, Moment], AfterValidator(_ordered)]
+Span = Annotated[tuple[units.Time, units.Time], AfterValidator(_ordered)]
 _PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
 
 
@@ -94,7 +58,7 @@ class FromData(Part):
     unit: units.UnitText | None = None
 
     @model_validator(mode="after")
-    def _one(self) -> FromData:
+    def _single(self) -> FromData:
         if (self.mean is None) == (self.column is None) or (self.mean is not None and self.unit is not None):
             what = "a value is taken from one of mean and column, and a mean has the unit of its channel"
             raise problem(what, "write {mean: channel} or {column: name, unit: deg}")
@@ -102,7 +66,7 @@ class FromData(Part):
 
 
 Setting = Annotated[
-    Annotated[FromData, Tag(":group")] | Annotated[FixedQuantity, Tag(":value")],
+    Annotated[FromData, Tag(":group")] | Annotated[units.Number, Tag(":value")],
     forms("a number with its unit, {mean: channel} or {column: name, unit: deg}"),
 ]
 
@@ -111,12 +75,12 @@ class TimeBase(Part):
     """Where time comes from: a column with its unit, or a sampling rate. dayfirst: 3/4/2026 is the third of April."""
 
     column: str | None = None
-    unit: TimeUnit | None = None
+    unit: units.TimeUnit | None = None
     rate: units.Frequency | None = None
     dayfirst: bool = True
 
     @model_validator(mode="after")
-    def _one(self) -> TimeBase:
+    def _single(self) -> TimeBase:
         if (self.column is None) == (self.rate is None):
             raise problem("time is either a column or a rate", "write {column: t, unit: s} or {rate: 2 kHz}")
         return self
@@ -142,30 +106,30 @@ class AngleSource(Part):
 
     from_: Literal["pulses", "column", "time", "speed"] = Field(alias="from")
     column: str | None = None
-    unit: AngleUnit | None = None
+    unit: units.AngleUnit | None = None
     per_turn: Pulses | None = None
     kind: Literal["count", "level"] | None = None
     wrap: Annotated[int, Field(ge=2)] | None = None
-    speed: FixedRate | None = None
+    speed: units.AngularSpeed | None = None
     channel: str | None = None
-    zero: FixedAngle = Quantity(0.0, KINDS["angle"])
+    zero: units.Angle = units.ZERO
     index: Index | None = None
     sign: Sign = 1
-    resolution: Annotated[FixedAngle, units.bounded(above=True)] | None = None
+    resolution: units.Step | None = None
 
     @model_validator(mode="after")
     def _of_its_kind(self) -> AngleSource:
         needed, allowed = _KEYS[self.from_]
         keys = {key for parts in _KEYS.values() for part in parts for key in part}
-        keys_stated = {key for key in keys if getattr(self, key) is not None}
-        if missing := [key for key in needed if key not in keys_stated]:
+        present = {key for key in keys if getattr(self, key) is not None}
+        if missing := [key for key in needed if key not in present]:
             raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
-        if extra := sorted(keys_stated - {*needed, *allowed}):
+        if extra := sorted(present - {*needed, *allowed}):
             remedy = f"remove it; the keys of from: {self.from_} are {', '.join((*needed, *allowed))}"
             raise problem(f"from: {self.from_} does not use {', '.join(extra)}", remedy)
         if self.wrap is not None and self.kind == "level":
             raise problem("only a running count wraps", "remove wrap, or write kind: count")
-        if self.speed is not None and self.speed.evaluate() == 0:
+        if self.speed is not None and self.speed.value == 0:
             raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
         return self
 
@@ -190,8 +154,8 @@ ChannelZero = Annotated[
 class Accuracies(Part):
     """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
 
-    gain: Annotated[FixedNumber, units.bounded(above=False)] = Quantity(0.0, KINDS["number"])
-    zero: units.Size = PLAIN_ZERO
+    gain: units.Share = units.ZERO
+    zero: units.Size = units.ZERO
 
 
 class FileChannel(Part):
@@ -199,17 +163,10 @@ class FileChannel(Part):
 
     unit: units.UnitText | None = None
     gain: units.Number | None = None
-    zero: ChannelZero = PLAIN_ZERO
+    zero: ChannelZero = units.ZERO
     range: units.Positive | None = None
     resolution: units.Positive | None = None
     accuracy: Accuracies = Accuracies()
-
-    def of(self, channel: Channel) -> Channel:
-        """The channel as it is in the file; UnitError if the two do not go together."""
-        changed = channel.model_copy(update={key: getattr(self, key) for key in self.model_fields_set})
-        if changed.unit is not None:
-            changed.scale(changed.unit)
-        return changed
 
 
 class Channel(FileChannel):
@@ -237,18 +194,27 @@ class Channel(FileChannel):
 
     def scale(self, unit: str) -> units.SensorScale:
         """How readings in a unit become the quantity; UnitError if they, or an amount of the channel, cannot."""
-        of_unit = units.scale(self.measures, unit, self.gain)
-        entries = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
-        for key, amount in {**entries, "accuracy.zero": self.accuracy.zero}.items():
+        scale = units.scale(self.measures, unit, self.gain)
+        amounts = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
+        for key, amount in {**amounts, "accuracy.zero": self.accuracy.zero}.items():
             if isinstance(amount, units.Amount):
-                of_unit.reading(amount, key)
-        return of_unit
+                scale.reading(amount, key)
+        return scale
+
+    def changed(self, of_file: FileChannel | None) -> Channel:
+        """The channel as it is in a file; UnitError if what the file states does not go with it."""
+        if of_file is None:
+            return self
+        channel = self.model_copy(update={key: getattr(of_file, key) for key in of_file.model_fields_set})
+        if channel.unit is not None:
+            channel.scale(channel.unit)
+        return channel
 
 
 class FileAngle(Part):
     """The angle in one data file: its zero, in place of that of `angle`."""
 
-    zero: FixedAngle
+    zero: units.Angle
 
 
 class File(Part):
@@ -268,12 +234,12 @@ class Filter(Part):
     order: Annotated[int, Field(ge=1, le=12)] = 4
 
 
-def _cycle(quantity: Quantity) -> Quantity:
+def _cycle(amount: units.Amount) -> units.Amount:
     """An angle or a time above zero."""
-    kinds = (ANGLE, KINDS["time"].dimensions[0], None)
-    if quantity.check({}) not in kinds or not float(quantity.evaluate()) > 0:
-        raise problem(f"'{quantity.source}' is no angle and no time above zero", "write it as 360 deg or 0.5 s")
-    return quantity
+    of_kind = amount.plain or ([*amount.dimensions.values()] == [1] and {"rad", "s"} & amount.dimensions.keys())
+    if not of_kind or not amount.value > 0:
+        raise problem(f"'{amount.source}' is no angle and no time above zero", "write it as 360 deg or 0.5 s")
+    return amount
 
 
 class DataMapping(Part):
@@ -288,15 +254,14 @@ class DataMapping(Part):
     channels: Annotated[Mapping[Name, Channel], Field(min_length=1)]
     set: Mapping[str, Setting] = {}
     filter: Filter | None = None
-    cycle: Annotated[FixedQuantity, AfterValidator(_cycle)] = Quantity.read("1 turn")
-    start: FixedAngle = Quantity(0.0, KINDS["angle"])
+    cycle: Annotated[units.Number, AfterValidator(_cycle)] = units.read_amount("1 turn")
+    start: units.Angle = units.ZERO
     positions: Annotated[int, Field(ge=2, le=100_000)] = 360
     drift: Literal["report", "remove"] = "report"
 
     def of_file(self, entry: File) -> DataMapping:
         """The same with what a file states of its own angle, its own channels, and what was set."""
-        channels = {name: entry.channels[name].of(channel) if name in entry.channels else channel
-                    for name, channel in self.channels.items()}  # fmt: skip
+        channels = {name: channel.changed(entry.channels.get(name)) for name, channel in self.channels.items()}
         changes: dict[str, Any] = {"channels": channels, "set": {**self.set, **entry.set}}
         if entry.angle is not None and self.angle is not None:
             changes["angle"] = self.angle.model_copy(update={"zero": entry.angle.zero})
@@ -305,7 +270,7 @@ class DataMapping(Part):
     @property
     def timed(self) -> bool:
         """Whether the cycle is a time."""
-        return self.cycle.check({}) == KINDS["time"].dimensions[0]
+        return "s" in self.cycle.dimensions
 
 
 # ---- the file -------------------------------------------------------------------------------------------------
@@ -333,10 +298,10 @@ class Mapped:
             raise MechanismError(self.placed([Finding("no data file is named", "files", remedy)]))
         if not paths:
             return [(self.folder / entry.file, entry) for entry in entries]
-        stated = {(self.folder / entry.file).resolve(): entry for entry in entries}
+        by_path = {(self.folder / entry.file).resolve(): entry for entry in entries}
         names = [Path(entry.file).name for entry in entries]
-        single = {name: entry for entry, name in zip(entries, names, strict=True) if names.count(name) == 1}
-        return [(path, stated.get(path.resolve()) or single.get(path.name) or File(file=path.name or "."))
+        by_name = {name: entry for entry, name in zip(entries, names, strict=True) if names.count(name) == 1}
+        return [(path, by_path.get(path.resolve()) or by_name.get(path.name) or File(file=path.name or "."))
                 for path in paths]  # fmt: skip
 
 
@@ -367,17 +332,16 @@ def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
     sources = [*channels, *(["angle"] if angle else [])]  # the mean speed by the angle
     settings = {"set": mapping.set} | {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
     named = {f"{key}.{name}.mean": value.mean for key, values in settings.items() for name, value in values.items()
-             if isinstance(value, FromData) and value.mean is not None and value.mean not in sources}  # fmt: skip
+             if isinstance(value, FromData) and value.mean is not None}  # fmt: skip
+    named |= {f"files.{k}.channels.{name}": name for k, file in enumerate(mapping.files) for name in file.channels}
     if angle is not None and angle.channel is not None:
-        if angle.channel not in channels:
-            named["angle.channel"] = angle.channel
-        elif not channels[angle.channel].measures.startswith("rate:"):
+        named["angle.channel"] = angle.channel
+        if angle.channel in channels and not channels[angle.channel].measures.startswith("rate:"):
             what = f"the channel '{angle.channel}' measures {channels[angle.channel].measures}, not a speed"
             yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
-    named |= {f"files.{k}.channels.{name}": name
-              for k, file in enumerate(mapping.files) for name in file.channels if name not in channels}  # fmt: skip
     for where, name in named.items():
-        yield Finding(f"there is no channel '{name}'", where, nearest(name, sources))
+        if name not in (sources if where.endswith(".mean") else channels):
+            yield Finding(f"there is no channel '{name}'", where, nearest(name, sources))
     if angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
         yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
@@ -390,7 +354,7 @@ def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
             yield Finding(what, f"files.{k}.angle", "add angle: {from: …}, or remove it")
         for name in file.channels.keys() & channels.keys():
             try:
-                file.channels[name].of(channels[name])
+                channels[name].changed(file.channels[name])
             except UnitError as error:
                 yield Finding(error.what, f"files.{k}.channels.{name}", error.remedy)
 

@@ -1,4 +1,4 @@
-"""What a measurement is to the analysis: courses over the cycle, turn by turn, with what is known of their accuracy.
+"""What a measurement is to the analysis: courses over the cycle, turn by turn, with their accuracy; the efficiency.
 
 Everything is SI. A measurement has conditions, a condition has courses, a course has one row for each turn.
 """
@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,14 @@ from scipy.special import ndtr, stdtrit
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import finding_rows
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
-from trunnion.rig.reading.turns import LeftOfSteps
+from trunnion.rig.reading.steps import LeftOfSteps
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 __all__ = [
-    "COVERAGE", "Accuracy", "Condition", "Efficiency", "Measurement", "Powers", "Signal", "UncertaintyContribution",
+    "COVERAGE", "Accuracy", "Condition", "Contribution", "Efficiency", "Measurement", "Powers", "Signal",
     "between_turns", "dataset", "efficiency_of", "pairs_of", "rms", "student",
 ]  # fmt: skip
 
@@ -44,15 +44,13 @@ VARIABLES = {
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Standard uncertainties of a channel that averaging does not lessen.
+    """Standard uncertainties of a channel that averaging does not lessen, in the unit of the course.
 
-    zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
-    all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
-    own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
-    of `zero` is the same in all files. datum: value at which the sensor reads 0, in the unit of the course; an error of
-    its gain acts on value − datum. cut: of what all readings are off by
-    alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`. left:
-    what of the error by the resolution all turns repeat, so that averaging leaves it; None for all of step/√12.
+    zero, gain (relative): the same at every position of all turns of a file; own: the part of `zero` that each file has
+    by itself, as by the mean of its unloaded stretch; datum: value at which the sensor reads 0, from where an error of
+    its gain acts. resolution: step between readings, 0 if there is none; cut: beside `zero`, of readings that may be
+    rounded or cut off to a step that noise does not carry them over; left: what of the error by steps all turns repeat,
+    None for all of step/√12.
     """
 
     zero: float = 0.0
@@ -68,11 +66,10 @@ class Accuracy:
 class Signal:
     """One channel in one condition.
 
-    channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
-    `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
-    read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
-    per_turn: pulses of a speed that is worked out from them, 0 of others; local: standard uncertainty of each position
-    by itself, beside that of the accuracy.
+    channel: its name in the mapping; measures: as `measures.measures.named` reads it (`effort:input`, `load:brake`);
+    unit: SI; turns: (turn, position), NaN where there is nothing to be had. read_in: unit of the readings for people,
+    factor to SI, where they are in a unit of what is measured: U/min. per_turn: pulses of a speed that is worked out
+    from them, 0 of others; local: standard uncertainty of each position by itself, beside that of the accuracy.
     """
 
     channel: str
@@ -115,14 +112,13 @@ class Signal:
     def unresolved(self) -> float:
         """Standard uncertainty by the resolution, what turns repeat of step/√12 (GUM F.2.2.1), where they scatter by
         less than half a step; more carries them over the steps, and their mean is finer."""
-        step = self.accuracy.resolution
+        step, left = self.accuracy.resolution, self.accuracy.left
         if not step:
             return 0.0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
-            scatter = float(np.nanmedian(self.scatter))
-        share = self.accuracy.left.share if self.accuracy.left is not None else 1.0
-        return 0.0 if scatter > step / 2 else share * step / 12**0.5
+            fine = float(np.nanmedian(self.scatter)) > step / 2
+        return 0.0 if fine else (1.0 if left is None else left.share) * step / 12**0.5
 
     @cached_property
     def uncertainty(self) -> Array:
@@ -140,14 +136,12 @@ class Signal:
 class Condition:
     """One working condition: what was set, and what was measured over the cycle.
 
-    values: numbers of the model that were set or measured once, by name, SI, for `Mechanism.with_values`;
-    phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
-    speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
-    start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
-    lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses;
-    cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
-    units: SI, of those of `values` that were stated with a unit; the others are plain numbers.
-    duration: of a cycle that is a time, s; NaN of one that is an angle.
+    values: numbers of the model that were set or measured once, by name, SI; units: of those with a unit, SI; phase:
+    (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from. speed: of the
+    driver, mean over the turns, rad/s, below zero where its coordinate falls; start, cycle: its coordinate at phase 0,
+    and how far it goes in a cycle, rad; duration: of a cycle that is a time, s; NaN where one is not known. lag:
+    standard uncertainty, s, of when the coordinate is passed, by the sampling of pulses; cut: that of the angle, rad
+    with its sign, by readings that may be cut off, alike in all files of that resolution.
     """
 
     name: str
@@ -243,24 +237,23 @@ COVERAGE = 2.0
 LACKING = 0.1
 """Share of its positions that a turn may lack and still count."""
 
-Source = Literal["gain", "zero", "resolution", "repeatability"]
+Powers = Sequence[tuple[Signal, Signal]]  # torque or force with its speed
 
 
-@dataclass(frozen=True)
-class UncertaintyContribution:
-    """What one source of one channel does to the efficiency; channel: empty of the scatter between turns.
+class Contribution(NamedTuple):
+    """What a source, "gain", "zero", "resolution" or "repeatability", of a channel does to the efficiency.
 
-    input: its standard uncertainty, of a gain relative, else in the unit of the channel; sensitivity: ∂η/∂ of it;
-    effect: the standard uncertainty of η by it alone, |sensitivity| · input.
+    input: its standard uncertainty, of a gain relative, else in the unit of the channel; sensitivity: ∂η/∂ of it.
     """
 
     channel: str
-    source: Source
+    source: str
     input: float
     sensitivity: float
 
     @property
     def effect(self) -> float:
+        """The standard uncertainty of η by it alone."""
         return abs(self.sensitivity) * self.input
 
 
@@ -268,24 +261,26 @@ class UncertaintyContribution:
 class Efficiency:
     """An efficiency measured in one condition.
 
-    value: mean power out over mean power in, over the time of all whole turns; uncertainty: standard; power_in,
-    power_out: W; per_turn: ratios of the single turns; left_out: turns that lack more than LACKING of their positions.
+    value: mean power out over mean power in, over the time of all whole turns; power_in, power_out: W; per_turn: ratios
+    of the single turns; left_out: turns that lack more than LACKING of their positions.
     """
 
     value: float
-    uncertainty: float
     power_in: float
     power_out: float
     per_turn: Array
-    contributions: tuple[UncertaintyContribution, ...]
+    contributions: tuple[Contribution, ...]
     left_out: int = 0
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard; NaN of one turn."""
+        return float(np.sqrt(sum(part.effect * part.effect for part in self.contributions)))
 
     @property
     def freedom(self) -> float:
         """Effective degrees of freedom: those of the scatter between turns by its share of u². GUM, G.4.1."""
-        scatter = sum(
-            contribution.effect for contribution in self.contributions if contribution.source == "repeatability"
-        )
+        scatter = sum(part.effect for part in self.contributions if part.source == "repeatability")
         share = self.uncertainty / scatter if scatter > 0 else float("inf")
         square = share * share  # not a power: near the end of the floats that is an error
         return (self.turns - 1) * square * square if scatter > 0 else float("inf")
@@ -308,9 +303,6 @@ class Efficiency:
         return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {self.factor():.2g})"
 
 
-Powers = tuple[tuple[Signal, Signal], ...]  # torque or force with its speed
-
-
 def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> tuple[Powers, Powers] | None:
     """The channels that tell power in and out: `effort:D` with `rate:D`, `load:L` with `rate:` of its joint.
 
@@ -320,23 +312,23 @@ def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> t
     subjects: dict[str, dict[str, Signal]] = {"effort": {}, "rate": {}, "load": {}}
     for course in condition.courses.values():
         kind, _, subject = course.measures.partition(":")
-        if kind in subjects:
-            subjects[kind].setdefault(subject, course)
-    efforts, rates, loads = subjects["effort"], subjects["rate"], subjects["load"]
+        subjects.get(kind, {}).setdefault(subject, course)
+    efforts, rates, loads = subjects.values()
     free = [name for name in rates if name not in efforts] or list(rates)
-    guessed = free[0] if len(free) == 1 else ""
-    places = {name: (joints or {}).get(name, guessed) for name in loads}
+    places = {name: (joints or {}).get(name, free[0] if len(free) == 1 else "") for name in loads}
     if not efforts or not loads or any(name not in rates for name in (*efforts, *places.values())):
         return None
-    driven = tuple((course, rates[name]) for name, course in efforts.items())
-    return driven, tuple((course, rates[places[name]]) for name, course in loads.items())
+    return [(course, rates[name]) for name, course in efforts.items()], [
+        (course, rates[places[name]]) for name, course in loads.items()
+    ]
 
 
 def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None) -> Efficiency:
     """The efficiency of one condition, with its standard uncertainty.
 
     η = P_out/P_in of the means over whole turns: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω,
-    with a speed by T, each by the time that the driver dwells at a position; the dwell with 1/ω of its channel.
+    with a speed by T, each by the time that the driver dwells at a position; the dwell with 1/ω of its channel. That is
+    taken from the mean course, not from each turn: 1/ω of a noisy ω is too large by its variance.
 
     Parameters
     ----------
@@ -358,12 +350,24 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
         what = f"the channels do not measure input and output power; there are {measured}"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
-    dwell, timing = _dwell(sides[0], condition)
-    powers = [np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0) for side in sides]
-    (powers_in, powers_out), fillable = _filled(*powers)
+    dwell, timing = np.ones(len(condition.phase)), None  # equal, unless one driver turns one way throughout
+    if np.isfinite(condition.speed):
+        speeds = [speed for _, speed in sides[0]]
+        driver = min(speeds, key=lambda speed: abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)))
+        if np.isfinite(driver.mean).all() and np.min(driver.mean) * np.max(driver.mean) > 0:
+            dwell, timing = 1 / np.abs(driver.mean), driver
+            dwell = dwell / np.mean(dwell)
+    powers = np.array([np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0) for side in sides])
+    # what few positions of a turn lack is the mean of the others there: without it the mean of the turn would be off
+    finite = np.all(np.isfinite(powers), axis=0)
+    fillable = np.mean(~finite, axis=1) <= LACKING
+    fillable &= np.any(finite[fillable], axis=0).all()  # else nothing is known of a position
     if not np.any(fillable):
         what = f"no turn is whole in all channels of {len(fillable)}"
         raise MechanismError(Finding(what, condition.name, "see the gaps reported by `trunnion data`"))
+    finite, powers = finite[fillable], powers[:, fillable]
+    usual = np.sum(powers, axis=1, where=finite) / np.maximum(np.sum(finite, axis=0), 1)
+    powers_in, powers_out = np.mean(np.where(finite, powers, usual[:, None]), axis=2)
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
     if not power_in:
         names = " or ".join(course.channel for pair in sides[0] for course in pair)
@@ -380,53 +384,15 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
             if timing is not None:
                 parts.append((timing, -by * force.turns[fillable] * speed.turns[fillable] / timing.mean))
             for course, weight in parts:  # a channel in several powers has the sum
-                before = weights.get(course.channel, (course, 0.0))[1]
-                weights[course.channel] = course, before + weight
+                weights[course.channel] = course, weights.get(course.channel, (course, 0.0))[1] + weight
     scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if len(per_turn) > 1 else float("nan")
-    contributions = [UncertaintyContribution("", "repeatability", scatter, 1.0)]
+    every = [Contribution("", "repeatability", scatter, 1.0)]
     for name, (course, weight) in weights.items():  # of what it reads, x → (1 + gain) x + zero
-        accuracy, by_zero = course.accuracy, float(np.nanmean(weight))
-        by_gain = float(np.nanmean(weight * (course.turns[fillable] - accuracy.datum)))
-        contributions += [
-            UncertaintyContribution(name, "gain", accuracy.gain, by_gain),
-            UncertaintyContribution(name, "zero", accuracy.zero, by_zero),
-            UncertaintyContribution(
-                name, "resolution", replace(course, turns=course.turns[fillable]).unresolved, by_zero
-            ),
-        ]
-    contributions = [contribution for contribution in contributions if not contribution.input <= 0]  # NaN stays
-    uncertainty = float(np.sqrt(sum(contribution.effect * contribution.effect for contribution in contributions)))
-    left_out = int(np.count_nonzero(~fillable))
-    return Efficiency(value, uncertainty, power_in, power_out, per_turn, tuple(contributions), left_out)
-
-
-def _dwell(driven: Powers, condition: Condition) -> tuple[Array, Signal | None]:
-    """Time that the driver spends at each position, (position,), 1 in the mean, and the course it was taken from.
-
-    By the driver whose mean speed is that of the angle; equal, of no course, if it does not turn one way throughout or
-    the cycle is a time. By the mean course, not that of each turn: 1/ω of a noisy ω is too large by its variance.
-    """
-    if np.isfinite(condition.speed):
-        speeds = [speed for _, speed in driven]
-        driver = min(speeds, key=lambda speed: abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)))
-        if np.isfinite(driver.mean).all() and np.min(driver.mean) * np.max(driver.mean) > 0:
-            dwell = 1 / np.abs(driver.mean)
-            return dwell / np.mean(dwell), driver
-    return np.ones(len(condition.phase)), None
-
-
-def _filled(*powers: Array) -> tuple[list[Array], NDArray[np.bool_]]:
-    """Mean powers of each whole turn, W, and which turns are.
-
-    A position that few of a turn lack is given both powers of the other turns there, in the mean: to leave it out would
-    put the turn's mean off by what a course has of its own there. A turn that lacks more is left out.
-    """
-    finite = np.all(np.isfinite(powers), axis=0)
-    fillable = np.mean(~finite, axis=1) <= LACKING
-    fillable &= np.any(finite[fillable], axis=0).all()  # else nothing is known of a position
-    finite = finite[fillable]
-    count = np.maximum(np.sum(finite, axis=0), 1)
-    usual = [np.sum(power[fillable], axis=0, where=finite) / count for power in powers]
-    return [
-        np.mean(np.where(finite, power[fillable], mean), axis=1) for power, mean in zip(powers, usual, strict=True)
-    ], fillable
+        accuracy, turns = course.accuracy, course.turns[fillable]
+        by_gain, by_zero = float(np.nanmean(weight * (turns - accuracy.datum))), float(np.nanmean(weight))
+        unresolved = Signal(name, course.measures, course.unit, turns, accuracy).unresolved
+        every.append(Contribution(name, "gain", accuracy.gain, by_gain))
+        every.append(Contribution(name, "zero", accuracy.zero, by_zero))
+        every.append(Contribution(name, "resolution", unresolved, by_zero))
+    contributions = tuple(part for part in every if not part.input <= 0)  # NaN stays
+    return Efficiency(value, power_in, power_out, per_turn, contributions, int(np.count_nonzero(~fillable)))

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +14,21 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.quantity import Quantity
-from trunnion.model.units import si_unit
 from trunnion.rig.reading import channels
 from trunnion.rig.reading.angle import coordinate
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
+from trunnion.rig.reading.steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.tables import DataTable, read_table
 from trunnion.rig.reading.timebase import counted, gathered, note, timeline, unit_of, warning
-from trunnion.rig.reading.turns import DENSE, LeftOfSteps, Turns, cut, joined, left_in_turns, resampled, time_mean
+from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
 from trunnion.rig.reading.units import dimensions, unit_name
 
 __all__ = ["read_measured"]
 
 Array = NDArray[np.float64]
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
+STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
 MOST_VALUES = 500  # that a column may state; more, and it is a measurement
@@ -73,29 +72,26 @@ def read_measured(
                 conditions += recording.conditions(steps)
     findings = mapped.placed([finding for recording in recordings for finding in recording.findings])
     if not conditions or any(recording.failed for recording in recordings):
-        raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))
+        raise MechanismError(gathered((item for item in findings if item.severity is not Severity.NOTE), same=True))
+    turns = [len(next(iter(condition.courses.values())).turns) for condition in conditions]
+    each = f"{min(turns):,}" if min(turns) == max(turns) else f"{min(turns):,} to {max(turns):,}"
+    each += " whole turns" if len(turns) == 1 else f" whole turns in each of {len(turns):,} conditions"
+    done = dict.fromkeys(sentence for recording in recordings for sentence in recording.done)
+    sentences = (f"{each}; rows before, between and after them are not used", *done)
     name = mapped.mapping.name or Path(mapped.file).stem
-    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), _done(conditions, recordings))
-
-
-def _done(conditions: Sequence[Condition], recordings: Sequence[_Recording]) -> tuple[str, ...]:
-    """How many turns are used, and what was done to the data, each sentence once."""
-    counts = [len(next(iter(condition.courses.values())).turns) for condition in conditions]
-    each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
-    where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
-    sentences = dict.fromkeys(sentence for recording in recordings for sentence in recording.done)
-    return (f"{each} whole turns{where}; rows before, between and after them are not used", *sentences)
+    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), sentences)
 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
     """Conditions with different names: the file is added where two are alike, then a number."""
-    names = [condition.name for condition in conditions]
-    renamed: dict[str, Condition] = {}
+    names, renamed = [condition.name for condition in conditions], dict[str, Condition]()
     for condition in conditions:
-        plain = condition.name
+        name = plain = condition.name
         if names.count(plain) > 1:
-            plain = f"{plain} ({', '.join(Path(file).stem for file in condition.files)})"
-        name = next(text for k in count(1) if (text := f"{plain} {k}" if k > 1 else plain) not in renamed)
+            name = plain = f"{plain} ({', '.join(Path(file).stem for file in condition.files)})"
+        number = 1
+        while name in renamed:
+            name, number = f"{plain} {number + 1}", number + 1
         renamed[name] = replace(condition, name=name)
     return list(renamed.values())
 
@@ -139,11 +135,11 @@ class _Recording:
         self.mapping, self.path, self.entry = mapping, path, entry
         self.findings: list[Finding] = []
         self.done: list[str] = []
-        self.sensors: dict[str, channels.ChannelReading] = {}
+        self.sensors: dict[str, channels.Sensor] = {}
         self.readings: dict[str, Array] = {}
         self.parts: list[_Part] = []
-        self.cycle, self.start = float(mapping.cycle.evaluate()), float(mapping.start.evaluate())
-        self.way, self.lag, self.cut = 1.0, 0.0, 0.0
+        self.cycle, self.start = mapping.cycle.value, mapping.start.value
+        self.sense, self.lag, self.cut = 1.0, 0.0, 0.0
         self.failed = False
 
     def say(self, finding: Finding | str | None) -> None:
@@ -171,7 +167,12 @@ class _Recording:
             say(f"read in the encoding {self.table.encoding}")
         self.line = timeline(self.table, mapping.time, say)
         if mapping.filter is not None:
-            channels.check_filter(mapping.filter, self.line, say)
+            order, cut_off = mapping.filter.order, mapping.filter.cut_off.value
+            passes = f"order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
+            say(f"low-pass filter: Butterworth of {passes}")
+            if not self.line.even:
+                what = "the samples are not evenly spaced in time, as a filter needs them"
+                say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
         for name, channel in mapping.channels.items():
             column = self.table.columns[channel.column]
             self.readings[name] = np.array(self.line.rows(column.values))
@@ -183,21 +184,20 @@ class _Recording:
             part.turns = cut(share, self.line, part.rows, allowed, mapping.positions, spoilt, say, part.where)
             if part.turns.numbers.size:
                 self.parts.append(part)
+                self._check(part)
             else:
                 cycles = share[allowed & part.rows & np.isfinite(share)]
                 what = f"there is no whole turn: {np.ptp(cycles) if cycles.size else 0:.3g} cycles in "
                 what, remedy = what + counted(cycles.size, "row"), "check angle, or record for longer"
                 say(Finding(what, part.where, remedy, code="data.turns.none"))
         if self.parts:
-            self._check_sampling()
             self._find_faults()
 
     def _cycles(self, allowed: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Cycles gone through by row, and stretches of time in which they are wrong; which way the coordinate runs."""
+        """Cycles gone through by row, and stretches of time in which they are wrong; the sense of the coordinate."""
         mapping, speed = self.mapping, None
-        if mapping.timed:
+        if mapping.timed or mapping.angle is None:
             return self.line.seconds / self.cycle, np.empty((0, 2))
-        assert mapping.angle is not None
         if (name := mapping.angle.channel) is not None:
             if (unit := self.sensors[name].scale.unit) != "rad/s":
                 what = f"the channel '{name}' is a speed in {unit}, not of a turning driver"
@@ -208,69 +208,70 @@ class _Recording:
         finite = np.flatnonzero(np.isfinite(angle.values) & allowed)
         if finite.size < 3:
             raise MechanismError(Finding("no row in use has a coordinate of the driver", "angle", "check angle.column"))
-        self.way = 1.0 if angle.values[finite[-1]] >= angle.values[finite[0]] else -1.0
+        self.sense = 1.0 if angle.values[finite[-1]] >= angle.values[finite[0]] else -1.0
         backward = np.repeat(self.line.spoilt[:, None], 2, axis=1)  # times
-        return self.way * (angle.values - self.start) / self.cycle, np.concatenate([angle.spoilt, backward])
+        return self.sense * (angle.values - self.start) / self.cycle, np.concatenate([angle.spoilt, backward])
 
     def _settings(self) -> list[_Part]:
         """The conditions of the file: one, or as many as the columns that state them take different values."""
-        texts, values, units, size = dict[str, str](), dict[str, float](), dict[str, str](), self.line.seconds.size
+        whole = _Part({}, {}, {}, np.ones(self.line.seconds.size, dtype=np.bool_))
         columns: dict[str, tuple[Array, str, float]] = {}  # values, unit and factor to SI
         for path, setting in self.mapping.set.items():
-            if isinstance(setting, Quantity):
-                values[path], texts[path] = float(setting.evaluate()), str(setting.source)
-                kind = None if setting.expression and setting.expression.bare else setting.check({})
-                units |= {path: si_unit(kind)} if kind is not None else {}
+            unit = ""
+            if not isinstance(setting, FromData):
+                whole.values[path], whole.texts[path], unit = setting.value, str(setting.source), setting.unit
             elif setting.column is not None:
                 column = self.table.columns[setting.column]
                 unit, factor = unit_of(f"set.{path}", setting.column, column, setting.unit, "", self.say)
                 columns[path] = self.line.rows(column.values), unit, factor
-                units |= {path: unit_name(dimensions(unit)[1])} if unit else {}
+            whole.units |= {path: unit_name(dimensions(unit)[1])} if unit else {}
         if not columns:
-            return [_Part(texts, values, units, np.ones(size, dtype=np.bool_))]
+            return [whole]
         raw = np.column_stack([numbers for numbers, _, _ in columns.values()])
         constant = np.isfinite(raw).all(axis=1)
         if not constant.all():
-            what = f"{counted(int(np.count_nonzero(~constant)), 'row')} of {size:,} without a condition; left out"
+            what = f"{counted(int(np.count_nonzero(~constant)), 'row')} of {len(raw):,} without a condition; left out"
             self.say(warning("setting.missing", "set", what, "check the column"))
-        levels, which = np.unique(_rounded(raw[constant]), axis=0, return_inverse=True)
+        digits = np.nan_to_num(np.floor(np.log10(np.abs(raw[constant]))), neginf=0.0)
+        scale = 10.0 ** (DIGITS - 1 - digits)
+        levels, which = np.unique(np.rint(raw[constant] * scale) / scale, axis=0, return_inverse=True)
         if not 0 < len(levels) <= MOST_VALUES:
             what = f"the columns that state the condition have {len(levels):,} different values"
             remedy = "check the column; a measured value is not a setting: write {mean: channel}"
             raise MechanismError(Finding(what, "set", remedy))
-        number, parts = np.full(size, -1), []
+        number, parts = np.full(len(raw), -1), []
         number[constant] = which.ravel()
         for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
-            part = _Part(dict(texts), dict(values), dict(units), number == k)
+            part = _Part(dict(whole.texts), dict(whole.values), dict(whole.units), number == k)
             for (path, (_, unit, factor)), value in zip(columns.items(), levels[k].tolist(), strict=True):
                 part.texts[path], part.values[path] = f"{value:.6g} {unit}".strip(), value * factor
             parts.append(part)
         return parts
 
-    def _check_sampling(self) -> None:
-        """How turns are sampled, whether they are enough and equally fast, and stretches without load in them."""
-        say, positions = self.say, self.mapping.positions
-        for part in self.parts:
-            turns = part.turns
-            if turns.numbers.size < 2:
-                what = "has one turn: there is no scatter, so no uncertainty"
-                say(warning("turns.one", part.where, what, "record two turns or more"))
-            say(channels.steady(turns, self.line.step, part.where))
-            if turns.density < 1:
-                samples = f"{turns.density * positions:.4g} samples a turn for {positions} positions"
-                what = f"the sampling is slow: {samples}; between them it is interpolated"
-                slow = warning if turns.density < SPARSE else note  # no fault of the readings
-                say(slow("sampling.slow", part.where, what, "state fewer positions, or sample faster"))
-            for name, channel in self.mapping.channels.items():
-                for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
-                    if inside := int(np.sum((turns.begin < high.value) & (turns.end > low.value))):
-                        what = f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into "
-                        what, remedy = what + counted(inside, "turn"), "state a stretch without load"
-                        say(warning("zero.in_turns", f"channels.{name}.zero", what, remedy))
-        most = int(min(part.turns.density for part in self.parts) * positions / DENSE)
-        averaged = "mean of the samples within half a position to either side"
-        by_cubic = f"interpolated by a cubic; with up to {most} positions they are means of samples"
-        say(f"values at a position: {averaged if most >= positions else by_cubic}")
+    def _check(self, part: _Part) -> None:
+        """Whether turns are enough, equally fast and well sampled, and no unloaded stretch reaches into them."""
+        turns, say, positions = part.turns, self.say, self.mapping.positions
+        if turns.numbers.size < 2:
+            what = "has one turn: there is no scatter, so no uncertainty"
+            say(warning("turns.one", part.where, what, "record two turns or more"))
+        speeds = 60 / (turns.end - turns.begin)
+        spread = float(np.ptp(speeds) / np.mean(speeds))
+        if spread > STEADY + 2 * self.line.step / float(np.mean(turns.end - turns.begin)):
+            what = f"the speed is not steady: {speeds.min():.4g} to {speeds.max():.4g} cycles a minute"
+            say(warning("speed.unsteady", part.where, what, "state files: over: to use the steady part"))
+        if turns.density < DENSE:  # no fault of the readings
+            what = (
+                f"{turns.density * positions:.4g} samples a turn for {positions} positions: values are interpolated; "
+            )
+            what += f"means of samples with up to {int(turns.density * positions / DENSE)} positions"
+            slow = warning if turns.density < SPARSE else note
+            say(slow("sampling.slow", part.where, what) if turns.density < 1 else what)
+        for name, channel in self.mapping.channels.items():
+            for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
+                if inside := int(np.sum((turns.begin < high.value) & (turns.end > low.value))):
+                    what = f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into "
+                    what, remedy = what + counted(inside, "turn"), "state a stretch without load"
+                    say(warning("zero.in_turns", f"channels.{name}.zero", what, remedy))
 
     def _find_faults(self) -> None:
         """Leave out stuck readings and spikes from before the first turn to after the last."""
@@ -280,11 +281,11 @@ class _Recording:
         self.running = slice(first, int(np.searchsorted(self.line.seconds, end[-1], "right")))
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        reach_of_fault = channels.WIDTH + int(reach / self.line.step)
+        width = channels.WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
-            where, moves = f"channels.{name}", not channel.measures.startswith("rate:")
+            moves = not channel.measures.startswith("rate:")
             for finding in channels.faults(
-                where, self.readings[name], self.line.seconds, (begin, end), reach_of_fault, moves
+                f"channels.{name}", self.readings[name], self.line.seconds, (begin, end), width, moves
             ):
                 self.say(finding)
 
@@ -309,7 +310,7 @@ class _Recording:
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
-    def _courses(self, name: str, sensor: channels.ChannelReading, step: float) -> Accuracy:
+    def _courses(self, name: str, sensor: channels.Sensor, step: float) -> Accuracy:
         """Put the courses of a channel into the parts; the accuracy of its sensor."""
         line, size, low_pass = self.line, sensor.size, self.mapping.filter
         readings, step = self.readings.pop(name), sensor.step or step
@@ -331,27 +332,23 @@ class _Recording:
             part.left[name] = left_in_turns(part.turns, course, readings / step, noise / step)
         zero_error = size * sensor.zero_uncertainty
         parts = [(part.turns, part.courses[name]) for part in self.parts]
-        creeps = sensor.channel.measures.startswith("rate:")  # a speed may
-        drift = None if creeps else channels.common_drift(parts)
-        if drift is not None:
-            what = f"drift: the mean of a turn changes by {drift.change:.3g} {sensor.scale.unit} in {drift.span:.4g} s"
-            what += f", {abs(drift.change) / max(drift.scatter, 1e-300):.3g} times the scatter of the turns"
-            remedy = "let sensor and bearings warm up, or state drift: remove"
+        slope, at_ends, what = channels.common_drift(parts, sensor.scale.unit)
+        if what and not sensor.channel.measures.startswith("rate:"):  # a speed may creep
             if self.mapping.drift == "remove":
                 since = float(line.seconds[0]) if np.isnan(sensor.since) else sensor.since
                 what += f"; a straight line is subtracted, zero at {since:.4g} s"
                 for part in self.parts:
-                    part.courses[name] = resampled(part.turns, values - drift.slope * (line.seconds - since), angle)
-                zero_error = float(np.hypot(zero_error, drift.error * drift.span / 2))  # of the line at either end
+                    part.courses[name] = resampled(part.turns, values - slope * (line.seconds - since), angle)
+                zero_error = float(np.hypot(zero_error, at_ends))
+            remedy = "let sensor and bearings warm up, or state drift: remove"
             self.say(warning("zero.drift_files", f"channels.{name}", what, remedy))
-        gain = float(sensor.channel.accuracy.gain.evaluate())
-        total = float(np.hypot(sensor.accuracy, zero_error))
+        gain, total = sensor.channel.accuracy.gain.value, float(np.hypot(sensor.accuracy, zero_error))
         return Accuracy(total, gain, size * step * coarse, zero_error, datum=sensor.datum)
 
     def _speed(self, parts: Sequence[_Part]) -> float:
         """Of the driver, with its sign, rad/s."""
         lengths = np.concatenate([part.turns.end - part.turns.begin for part in parts])
-        return self.way * self.cycle / float(np.mean(lengths))
+        return self.sense * self.cycle / float(np.mean(lengths))
 
     def _condition(self, part: _Part, accuracies: Mapping[str, Accuracy]) -> Condition:
         """A condition with its courses, and values that are means of channels."""
@@ -364,13 +361,12 @@ class _Recording:
             courses[name] = replace(course, accuracy=accuracy)
         speed = np.nan if mapping.timed else self._speed([part])
         for path, setting in mapping.set.items():
-            if not isinstance(setting, FromData) or setting.mean is None:
-                continue
-            mean = courses.get(setting.mean)  # else of the angle
-            part.values[path], part.units[path] = speed, "rad/s"
-            if mean is not None:
-                part.values[path], part.units[path] = time_mean(part.turns, mean.turns), mean.unit
-                if not np.isfinite(mean.turns).any():
+            if isinstance(setting, FromData) and setting.mean is not None:
+                mean = courses.get(setting.mean)  # else of the angle
+                part.values[path], part.units[path] = speed, "rad/s"
+                if mean is not None:
+                    part.values[path], part.units[path] = time_mean(part.turns, mean.turns), mean.unit
+                if mean is not None and not np.isfinite(mean.turns).any():
                     what = f"the channel '{setting.mean}', whose mean it is, has no value in any turn"
                     raise MechanismError(Finding(what, f"set.{path}", "correct the channel, or state it"))
         start, span, duration = (np.nan, np.nan, self.cycle) if mapping.timed else (self.start, self.cycle, np.nan)
@@ -380,18 +376,8 @@ class _Recording:
         )  # fmt: skip
 
 
-# ---- helpers --------------------------------------------------------------------------------------------------
-
-
-def _key(name: str, sensor: channels.ChannelReading) -> StepKey:
+def _key(name: str, sensor: channels.Sensor) -> StepKey:
     return name, sensor.unit, sensor.scale.factor
-
-
-def _rounded(values: Array) -> Array:
-    """Values to so many significant digits."""
-    digits = np.where(values == 0, 0, np.floor(np.log10(np.abs(values))))
-    scale = 10.0 ** (DIGITS - 1 - np.where(np.isfinite(digits), digits, 0))
-    return np.asarray(np.rint(values * scale) / scale)
 
 
 def _table(path: Path, mapping: DataMapping) -> DataTable:

@@ -68,7 +68,6 @@ class DataTable:
     interval: (start, step) of evenly spaced samples in s, if the file itself states it; encoding: of a text file.
     """
 
-    file: str
     columns: Mapping[str, Column]
     interval: tuple[float, float] | None = None
     encoding: str = "utf-8"
@@ -105,8 +104,13 @@ def read_table(path: Path, names: Iterable[str], optional: Iterable[str] = ()) -
     reading(path)
     try:
         table = reader(path, list(dict.fromkeys(names)), list(dict.fromkeys(optional)))
+    except MechanismError:
+        raise
     except OSError as error:
         raise _failed(path, f"cannot be read: {error.strerror or error}", "check the file") from None
+    except Exception as error:  # what parsing of a broken file meets: struct, Value-, Key-, EOF-, Arrow-, TypeError
+        what = f"is not {suffix} that can be read: {(str(error).splitlines() or [type(error).__name__])[0][:120]}"
+        raise _failed(path, what, "check the file") from None
     if table.rows == 0:
         raise _failed(path, "has a header but no rows of numbers", "check that the recording was saved")
     return table
@@ -209,7 +213,7 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
         raise _failed(path, what, remedy)
     columns = {name: _column(frame[place].to_numpy(), units[place], decimal)
                for name, place in places.items()}  # fmt: skip
-    return DataTable(str(path), columns, encoding=encoding)
+    return DataTable(columns, encoding=encoding)
 
 
 def _first_lines(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -256,22 +260,18 @@ def _header(path: Path, lines: list[tuple[int, str]], columns: set[str]) -> tupl
 
 def _read_parquet(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
     """The columns of a Parquet file; a unit is the entry `unit` or `units` of the column's metadata."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    try:
-        with pq.ParquetFile(path) as file:
-            schema = file.schema_arrow
-            places = _places(path, list(schema.names), names, optional)
-            table = file.read(columns=list(places))
-    except pa.ArrowException as error:
-        raise _failed(path, f"is not Parquet: {str(error).splitlines()[0][:120]}", "check the file") from None
+    with pq.ParquetFile(path) as file:
+        schema = file.schema_arrow
+        places = _places(path, list(schema.names), names, optional)
+        table = file.read(columns=list(places))
     columns = {}
     for name in places:
         meta = schema.field(name).metadata or {}
         unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
         columns[name] = _column(table.column(name).to_pandas(), unit)
-    return DataTable(str(path), columns)
+    return DataTable(columns)
 
 
 def _read_tdms(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
@@ -281,28 +281,23 @@ def _read_tdms(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
     """
     from nptdms import TdmsFile
 
-    try:
-        with path.open("rb") as stream, TdmsFile.open(stream) as file:
-            every = [channel for group in file.groups() for channel in group.channels()]
-            short = [channel.name for channel in every]
-            full = {f"{channel.group_name}/{channel.name}": channel for channel in every}
-            present = [channel.name if short.count(channel.name) == 1 else name for name, channel in full.items()]
-            channels = {**full, **dict(zip(present, full.values(), strict=True))}
-            listed = [*present, *(name for name in (*names, *optional) if name in full and name not in present)]
-            chosen = {name: channels[name] for name in _places(path, listed, names, optional)}
-            steps = {(float(one.properties.get("wf_start_offset", 0.0)), float(one.properties["wf_increment"]))
-                     for one in chosen.values() if one.properties.get("wf_increment")}  # fmt: skip
-            if len({len(one) for one in chosen.values()}) > 1 or len({round(step, 15) for _, step in steps}) > 1:
-                of_each = (f"'{name}' {len(one):,}" for name, one in chosen.items())
-                what = f"its channels have different numbers of samples or rates: {', '.join(of_each)}"
-                raise _failed(path, what, "record them at one rate")
-            columns = {name: _column(one[:], str(one.properties.get("unit_string", "") or ""))
-                       for name, one in chosen.items()}  # fmt: skip
-    except (MechanismError, OSError):
-        raise
-    except Exception as error:  # nptdms raises what its parsing of a broken file meets: struct, Value-, Key-, EOFError
-        raise _failed(path, f"is not TDMS: {str(error)[:120] or type(error).__name__}", "check the file") from None
-    return DataTable(str(path), columns, min((pair for pair in steps if pair[1] > 0), default=None))
+    with path.open("rb") as stream, TdmsFile.open(stream) as file:
+        every = [channel for group in file.groups() for channel in group.channels()]
+        short = [channel.name for channel in every]
+        full = {f"{channel.group_name}/{channel.name}": channel for channel in every}
+        present = [channel.name if short.count(channel.name) == 1 else name for name, channel in full.items()]
+        channels = {**full, **dict(zip(present, full.values(), strict=True))}
+        listed = [*present, *(name for name in (*names, *optional) if name in full and name not in present)]
+        chosen = {name: channels[name] for name in _places(path, listed, names, optional)}
+        waves = [channel.properties for channel in chosen.values() if channel.properties.get("wf_increment")]
+        steps = {(float(wave.get("wf_start_offset", 0.0)), float(wave["wf_increment"])) for wave in waves}
+        if len({len(channel) for channel in chosen.values()}) > 1 or len({round(step, 15) for _, step in steps}) > 1:
+            lengths = ", ".join(f"'{name}' {len(channel):,}" for name, channel in chosen.items())
+            what = f"its channels have different numbers of samples or rates: {lengths}"
+            raise _failed(path, what, "record them at one rate")
+        columns = {name: _column(channel[:], str(channel.properties.get("unit_string", "") or ""))
+                   for name, channel in chosen.items()}  # fmt: skip
+    return DataTable(columns, min((pair for pair in steps if pair[1] > 0), default=None))
 
 
 def _read_netcdf(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
@@ -316,27 +311,20 @@ def _read_netcdf(path: Path, names: Sequence[str], optional: Sequence[str]) -> D
         classic = stream.read(3) == b"CDF"
     if not classic and not all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py")):
         raise _failed(path, ".nc of version 4 needs h5netcdf", "pip install 'trunnion[netcdf]'")
-    try:
-        if not classic:  # where h5netcdf fails at the first attributes, it prints a traceback when it is cleared away
-            with importlib.import_module("h5py").File(path, "r") as whole:
-                whole.attrs.get("_nc3_strict")
-        with xr.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_cf=False) as file:
-            places = _places(path, [str(name) for name in file.variables], names, optional)
-            chosen = xr.decode_cf(file.drop_vars(file.variables.keys() - places.keys()), decode_timedelta=False)
-            sizes = {name: dict(chosen[name].sizes) for name in places}
-            if any(len(size) != 1 or size != next(iter(sizes.values())) for size in sizes.values()):
-                of_each = (f"'{name}' {' × '.join(f'{key} {count:,}' for key, count in size.items()) or 'none'}"
-                           for name, size in sizes.items())  # fmt: skip
-                what = f"its variables are not all of one dimension, the same for all: {', '.join(of_each)}"
-                raise _failed(path, what, "write each column as a variable of that dimension alone")
-            columns = {name: _column(chosen[name].values, bare(str(chosen[name].attrs.get("units", ""))))
-                       for name in places}  # fmt: skip
-    except MechanismError:
-        raise
-    except Exception as error:  # what SciPy, HDF5 and the decoding of a broken file raise: Value-, Key-, OS-, TypeError
-        what = f"is not NetCDF that can be read: {str(error)[:120] or type(error).__name__}"
-        raise _failed(path, what, "check the file") from None
-    return DataTable(str(path), columns)
+    if not classic:  # where h5netcdf fails at the first attributes, it prints a traceback when it is cleared away
+        with importlib.import_module("h5py").File(path, "r") as whole:
+            whole.attrs.get("_nc3_strict")
+    with xr.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_cf=False) as file:
+        places = _places(path, [str(name) for name in file.variables], names, optional)
+        chosen = xr.decode_cf(file.drop_vars(file.variables.keys() - places.keys()), decode_timedelta=False)
+        sizes = [dict(chosen[name].sizes) for name in places]
+        if any(len(size) != 1 or size != sizes[0] for size in sizes):
+            each = ", ".join(f"{name} {size}" for name, size in zip(places, sizes, strict=True))
+            what = f"its variables are not all of one dimension, the same for all: {each}"
+            raise _failed(path, what, "write each column as a variable of that dimension alone")
+        columns = {name: _column(chosen[name].values, bare(str(chosen[name].attrs.get("units", ""))))
+                   for name in places}  # fmt: skip
+    return DataTable(columns)
 
 
 Reader = Callable[[Path, Sequence[str], Sequence[str]], DataTable]

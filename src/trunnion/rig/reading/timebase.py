@@ -1,9 +1,10 @@
-"""Time of every row, and what is wrong with it: gaps, steps backward, repeated and uneven times."""
+"""Time of every row, and what is wrong with it: gaps, steps backward, repeated times; findings about data."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -33,19 +34,19 @@ _PER_MINUTE = re.compile(r"1\s*/\s*[Mm]in|[Mm]in\^?-1")  # in a heading; in a mo
 class Timeline:
     """Rising times of the rows that are kept.
 
-    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; even: whether the samples are evenly
-    spaced but for gaps; spoilt: times at which the clock ran backward.
+    seconds: (row,); places: of the rows in the table; step: the usual one, s; even: whether they are evenly spaced
+    but for gaps; spoilt: times at which the clock ran backward.
     """
 
     seconds: Array
-    kept: NDArray[np.intp] | None
+    places: NDArray[np.intp] | slice
     step: float
     even: bool = True
     spoilt: Array = field(default_factory=lambda: np.empty(0))
 
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""
-        return values if self.kept is None else values[self.kept]
+        return values[self.places]
 
 
 def timeline(table: DataTable, base: TimeBase | None, say: Say) -> Timeline:
@@ -68,32 +69,26 @@ def timeline(table: DataTable, base: TimeBase | None, say: Say) -> Timeline:
     else:
         remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
         raise MechanismError(Finding("no column gives the time of its rows", "time", remedy))
-    return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, None, step)
+    return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, slice(None), step)
 
 
 def _rising(seconds: Array, say: Say) -> Timeline:
     """Times that rise, from a column: rows whose time does not rise are left out."""
-    highest = np.fmax.accumulate(seconds)
-    rises = np.isfinite(seconds) & (seconds > np.concatenate([[-np.inf], np.nan_to_num(highest[:-1], nan=-np.inf)]))
-    rising = np.flatnonzero(rises)
+    highest, finite = np.fmax.accumulate(seconds), np.isfinite(seconds)
+    rises = finite & (seconds > np.concatenate([[-np.inf], np.nan_to_num(highest[:-1], nan=-np.inf)]))
+    rising, clock = np.flatnonzero(rises), seconds[finite]
     if rising.size < 3:
         what = f"the time rises in {rising.size} of {counted(seconds.size, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
-    finite = seconds[np.isfinite(seconds)]
-    back = np.diff(finite) < 0
+    clean, back = seconds[rising], np.diff(clock) < 0
     if rising.size < seconds.size:
-        bare, late = ~np.isfinite(seconds), np.isfinite(seconds) & ~rises
-        kinds = [f"{counted(int(bare.sum()), 'row')} of {seconds.size:,} left out: no time in them"] * bool(bare.any())
-        if late.any():
-            kinds.append(f"{counted(int(late.sum()), 'row')} of {seconds.size:,} left out: their time does not rise, ")
-            kinds[-1] += at_times(highest[late])
+        what = (
+            f"{counted(seconds.size - rising.size, 'row')} of {seconds.size:,} left out: {np.sum(~finite):,} have no "
+        )
+        what += f"time, of the others it does not rise, {at_times(highest[finite & ~rises])}"
         if back.any():
-            what = f"it runs backward {counted(int(back.sum()), 'time')} by up to {-np.diff(finite).min():.4g} s"
-            kinds.append(what)
-        what = "; ".join(kinds)
-        remedy = "check the logger's clock, split the file where a recording begins, or state time: {rate: …}"
-        say(warning("time.backward", "time", what, remedy))
-    clean = seconds[rising]
+            what += f"; it runs backward {counted(int(back.sum()), 'time')} by up to {-np.diff(clock).min():.4g} s"
+        say(warning("time.backward", "time", what, "check the logger's clock, or split the file"))
     steps = np.diff(clean)
     step = float(np.median(steps))
     if float(clean[-1]) - float(clean[0]) >= COUNTED * step:
@@ -104,44 +99,36 @@ def _rising(seconds: Array, say: Say) -> Timeline:
         samples, longest = int(np.sum(np.rint(steps[gaps] / step) - 1)), int(gaps[np.argmax(steps[gaps])])
         what = f"{counted(gaps.size, 'gap')} in time, {counted(samples, 'sample')} missing, the longest "
         what += f"{steps[longest]:.4g} s at {clean[longest]:.5g} s"
-        say(warning("time.gaps", "time", what, "the positions in them have fewer turns; check the logger's buffer"))
-    even = float(np.std(steps[~wide] / step)) < UNEVEN
-    return Timeline(clean, rising if rising.size < seconds.size else None, step, even, finite[:-1][back])
+        say(warning("time.gaps", "time", what, "check the logger's buffer"))
+    return Timeline(clean, rising, step, float(np.std(steps[~wide] / step)) < UNEVEN, clock[:-1][back])
 
 
-def unit_of(
-    where: str, name: str, column: Column, unit_stated: str | None, assumed: str, say: Say
-) -> tuple[str, float]:
-    """Unit of a column, and its factor to SI: the mapping's, else the file's, else one that is assumed.
+def unit_of(where: str, name: str, column: Column, in_mapping: str | None, usual: str, say: Say) -> tuple[str, float]:
+    """Unit of a column, and its factor to SI: the mapping's, else the file's, else the usual one.
 
-    where: the entry of the mapping that has the key `unit`. What the file states otherwise is a finding. A speed of
-    rotation in 1/min is one in rpm.
+    where: the entry of the mapping that has the key `unit`. A speed of rotation in 1/min is one in rpm.
     """
-    if assumed == "rad/s" and _PER_MINUTE.fullmatch(normalise(column.unit).strip()):
-        column = replace(column, unit="rpm")
-    unit = unit_stated or column.unit or assumed
-    if not (unit_stated or column.unit) and assumed:
-        what = f"the column '{name}' has no unit; SI is assumed ({assumed})"
-        say(note("unit.none", where, what, f"state {where}.unit"))
+    in_file = "rpm" if usual == "rad/s" and _PER_MINUTE.fullmatch(normalise(column.unit).strip()) else column.unit
+    unit = in_mapping or in_file or usual
+    if usual and not (in_mapping or in_file):
+        say(
+            note("unit.none", where, f"the column '{name}' has no unit; SI is assumed ({usual})", f"state {where}.unit")
+        )
     try:
         factor, kind = dimensions(unit) if unit else (1.0, {})
     except UnitError as error:
         remedy = f"state {where}.unit in the mapping; in the file, {error.remedy}"
         raise MechanismError(Finding(f"the column '{name}': {error.what}", where, remedy)) from None
-    if where in ("time", "angle") and not alike(kind, dimensions(assumed)[1]):
+    if where in ("time", "angle") and not alike(kind, dimensions(usual)[1]):
         what = f"the column '{name}' has the unit '{unit}', which is no {where}"
         raise MechanismError(Finding(what, where, "name another column"))
-    if unit_stated and column.unit:
-        try:
-            size, of_file = dimensions(column.unit)
-        except UnitError:
-            return unit, factor
-        turns = of_file == HERTZ and alike(kind, dimensions("rad/s")[1])  # a setting in 1/min, its entry says rpm
-        turns = turns and bool(np.isclose(factor / size, (1, 2 * np.pi)).any())
-        if not turns and not (alike(of_file, kind) and size == factor):
+    with suppress(UnitError):
+        size, of_file = dimensions(in_file if in_mapping and in_file else unit) if unit else (1.0, {})
+        if of_file == HERTZ and "rad" in kind:  # 1/min in the heading, rpm in the mapping
+            size, of_file = min((size, 2 * np.pi * size), key=lambda turns: abs(turns - factor)), kind
+        if not (alike(of_file, kind) and np.isclose(size, factor, rtol=1e-12, atol=0)):
             times = f": all values are {factor / size:.3g} times those of the file" if alike(of_file, kind) else ""
-            what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{unit_stated}', which is taken"
-            what += times
+            what = f"the file has the unit '{in_file}' for '{name}', the mapping '{in_mapping}', which is taken{times}"
             say(warning("unit.differs", where, what, f"correct {where}.unit, or remove it"))
     return unit, factor
 
@@ -166,15 +153,16 @@ def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
     """
     groups: dict[tuple[str, ...], list[Finding]] = {}
     for finding in findings:
-        kind, text = finding.where.partition(" ")[0], finding.what if same else ""
-        groups.setdefault((finding.severity, kind, finding.code, finding.remedy, text), []).append(finding)
+        key = (finding.severity, finding.code, finding.where.partition(" ")[0], finding.what if same else "")
+        groups.setdefault(key, []).append(finding)
     merged = []
-    for (_, kind, *_), group in groups.items():
-        first, files = group[0], list(dict.fromkeys(Path(finding.file).name for finding in group if finding.file))
-        if len(group) > 1:
-            where = first.where if len({finding.where for finding in group}) == 1 else f"{kind}s"
-            named = f": {', '.join(files[:4])}" + ", …" * (len(files) > 4) if files else ""
-            what = f"{first.what} — {len(group)} such findings{named}"
+    for first, *others in groups.values():
+        if others:
+            files = list(dict.fromkeys(Path(finding.file).name for finding in (first, *others) if finding.file))
+            what = f"{first.what} — {len(others) + 1} such findings"
+            what += f": {', '.join(files[:4])}{', …' * (len(files) > 4)}" if files else ""
+            several = any(finding.where != first.where for finding in others)
+            where = f"{first.where.partition(' ')[0]}s" if several else first.where
             first = replace(first, what=what, where=where, file="", line=None)
         merged.append(first)
     return merged

@@ -6,7 +6,6 @@ to the position along the slope there; with fewer it is interpolated by a cubic 
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +13,7 @@ from numpy.typing import NDArray
 
 from trunnion.rig.reading.timebase import GAP, Say, Timeline, at_times, counted, note
 
-__all__ = [
-    "DENSE", "LeftOfSteps", "Turns", "covariance_of_steps", "cut", "in_step", "joined", "left_in_turns",
-    "left_of_steps", "noise_before", "resampled", "time_mean", "turn_means",
-]  # fmt: skip
+__all__ = ["DENSE", "TURN", "Turns", "cut", "joined", "resampled", "time_mean", "turn_means"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -49,6 +45,12 @@ class Turns:
         """Samples a position."""
         return float(np.mean(self.end - self.begin)) / (self.line.step * self.positions) if self.numbers.size else 0.0
 
+    @property
+    def rising(self) -> NDArray[np.intp]:
+        """Rows that are farther in the cycle than all before."""
+        highest = np.maximum.accumulate(np.where(np.isfinite(self.share), self.share, -np.inf))
+        return np.flatnonzero(self.share > np.concatenate([[-np.inf], highest[:-1]]))
+
 
 def cut(
     shares: Array, times: Timeline, of: Mask, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str
@@ -63,7 +65,7 @@ def cut(
     window = slice(int(rows[0]), int(rows[-1]) + 1)
     share, line, allowed = shares[window], replace(times, seconds=times.seconds[window]), (allowed & of)[window]
     begin, end, numbers = _whole(share, line)
-    refused = np.concatenate([[0], np.cumsum(~allowed)])  # turns some of whose rows are not allowed
+    refused = np.concatenate([[0], np.cumsum(~allowed)])
     low, high = (np.searchsorted(line.seconds, edge) for edge in (begin + 0.5 * line.step, end - 0.5 * line.step))
     inside = allowed.all() | ((refused[np.maximum(high, low)] == refused[low]) & (high > low))
     begin, end, numbers = begin[inside], end[inside], numbers[inside]
@@ -73,15 +75,14 @@ def cut(
         left_out = int(np.sum(np.maximum(np.rint(lengths[odd] / usual), 1)))  # over a gap it may be several
         span = f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
         what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
-        remedy = "the drive starts, stops or rests there, or rows are missing; use files: over: for the steady part"
-        say(note("turns.unusual", where, what, remedy))
-    keep = ~odd
+        say(note("turns.unusual", where, what, "the drive starts, stops or rests there, or rows are missing"))
+    good = ~odd
     for low, high in spoilt:
         slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
-        keep &= (begin > high - slack) | (end < low + slack)
-    begin, end = begin[keep], end[keep]
+        good &= (begin > high - slack) | (end < low + slack)
+    begin, end = begin[good], end[good]
     moving = _rows_of(share, begin, end, line, allowed, positions)
-    return Turns(share, numbers[keep], begin, end, moving, positions, line, window)
+    return Turns(share, numbers[good], begin, end, moving, positions, line, window)
 
 
 def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -166,15 +167,9 @@ def _averaged(turns: Turns, values: Array) -> Array:
     return np.asarray((mean - slope * centre).reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
 
 
-def _rising(turns: Turns) -> NDArray[np.intp]:
-    """Rows that are farther in the cycle than all before."""
-    highest = np.maximum.accumulate(np.where(np.isfinite(turns.share), turns.share, -np.inf))
-    return np.flatnonzero(turns.share > np.concatenate([[-np.inf], highest[:-1]]))
-
-
 def _interpolated(turns: Turns, values: Array) -> Array:
     """A cubic through the four samples about a position; a straight line between two where one of them is missing."""
-    rows, step = _rising(turns), turns.line.step
+    rows, step = turns.rising, turns.line.step
     if rows.size < 2:
         return np.full((turns.numbers.size, turns.positions), np.nan)
     x, y, seconds = turns.share[rows], values[rows], turns.line.seconds[rows]
@@ -190,7 +185,7 @@ def _interpolated(turns: Turns, values: Array) -> Array:
         factors = [(at[smooth] - near[:, j]) / (near[:, i] - near[:, j]) for j in range(4) if j != i]
         by_cubic += np.prod(factors, axis=0) * y[four[smooth]][:, i]
     course[smooth] = by_cubic
-    far = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample beyond: up to one step is extrapolated
+    far = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample past it: up to one step is extrapolated
     usual = max(1.0, float(np.rint(np.median(np.diff(seconds)) / step)))
     course[far | (seconds[after] - seconds[after - 1] > GAP * step * usual)] = np.nan
     return np.asarray(course.reshape(-1, turns.positions))
@@ -211,114 +206,9 @@ def time_mean(turns: Turns, course: Array) -> float:
 
     The mean over the positions is that over the angle: of a speed that varies within the turn it is too high.
     """
-    rows = _rising(turns)
+    rows = turns.rising
     edges = turns.numbers[:, None] + (np.arange(turns.positions + 1) - 0.5) / turns.positions
     dwell = np.diff(np.interp(edges, turns.share[rows], turns.line.seconds[rows]), axis=1)
     finite = np.isfinite(course)
     total = float(np.sum(dwell, where=finite))
     return float(np.sum(dwell * course, where=finite)) / total if total > 0 else float("nan")
-
-
-# ---- the error by steps that all turns repeat ------------------------------------------------------------------
-
-ALIKE = 0.9  # of 1, from which every turn is sampled at the same places
-HARMONICS = 10  # of the wave, that are looked at
-PLACES = 8  # of the first sample of a turn, between two
-_K = np.arange(1.0, 200.0)
-_NOISE = np.linspace(0.0, 1.0, 1001)  # σ/q
-
-
-@dataclass(frozen=True)
-class LeftOfSteps:
-    """What all turns repeat of the error by steps.
-
-    share: its standard deviation, of step/√12; noise: σ, in steps; samples: of a turn; every: whether every turn is
-    sampled at the same places.
-    """
-
-    share: float
-    noise: float
-    samples: float
-    every: bool
-
-
-def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) -> LeftOfSteps:
-    """How much of the error by steps is the same in all turns.
-
-    course: (turn, position); readings: one a row of the file; both in steps; noise: scatter of the readings from row to
-    row, in steps, with the error by steps in it unless the course stays within one.
-    """
-    share, samples = in_step(turns, course), float(np.median(turns.end - turns.begin)) / turns.line.step
-    every = share > ALIKE
-    if every:  # then what a reading differs by from that a turn later is noise
-        rows = np.where(turns.rows, readings[turns.window], np.nan)
-        later = max(round(samples), 1)  # the next row, where a turn is shorter than half a row
-        apart = rows[later:] - rows[:-later]
-        apart = apart[np.isfinite(apart)]
-        noise = noise_before(float(np.sqrt(np.mean(apart**2) / 2))) if apart.size else 0.0
-    else:
-        noise = float(np.sqrt(max(noise**2 - 1 / 12, 0.0)))
-    return LeftOfSteps(float(np.sqrt(share * left_of_steps(noise))), noise, samples, every)
-
-
-def left_of_steps(noise: Array | float) -> Array:
-    """Mean square of the wave, of q²/12, for noise in steps: 1 without, 0 of half a step and more."""
-    waves = np.exp(-4 * (np.pi * np.asarray(noise)[..., None] * _K) ** 2) / _K**2
-    return np.asarray(np.sum(waves, axis=-1) / np.sum(1 / _K**2))
-
-
-def noise_before(scatter: float) -> float:
-    """σ/q of readings that scatter so much, in steps, where they repeat: scatter² = σ² + (1 − left)/12."""
-    return float(np.interp(scatter, np.sqrt(_NOISE**2 + (1 - left_of_steps(_NOISE)) / 12), _NOISE))
-
-
-def in_step(turns: Turns, course: Array) -> float:
-    """How far turns are sampled at the same places of a step, 0 to 1; course: (turn, position), in steps.
-
-    At a position the samples next to it are off it by a part of a position, and along the slope of the course by a part
-    of a step: |mean of exp(2πi part)|², less what chance makes of n turns.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of positions without a value
-        mean = np.nan_to_num(np.nanmean(course, axis=0))
-    slope = 0.5 * (np.roll(mean, -1) - np.roll(mean, 1))
-    scaled = turns.share[turns.rows] * turns.positions
-    place = np.floor(scaled + 0.5)
-    off = scaled - place
-    order = np.lexsort((np.abs(off), place))
-    nearest = order[np.diff(place[order], prepend=-np.inf) > 0]
-    at = place[nearest].astype(np.int64) % turns.positions
-    angle = 2 * np.pi * slope[at] * off[nearest]
-    count = np.bincount(at, minlength=turns.positions)
-    many = count > 1
-    if not many.any():
-        return 1.0
-    parts = (np.bincount(at, component, count.size) for component in (np.cos(angle), np.sin(angle)))
-    alike = (sum(part[many] ** 2 for part in parts) / count[many] - 1) / (count[many] - 1)
-    return float(np.clip(np.mean(alike), 0.0, 1.0))
-
-
-def covariance_of_steps(columns: Array, course: Array, left: LeftOfSteps) -> Array:
-    """Covariance of sums over positions of columns · error by steps, in units of the step.
-
-    columns: (sum, position); course: true, (position,), in steps. Where the course gains about a whole number of steps
-    from sample to sample, as it may beside its steepest places, the errors of many samples are alike. The mean is taken
-    over all places in a step, for each harmonic of the wave by itself, and some of the first sample in a turn.
-    """
-    size, count, grid = course.size, round(left.samples), np.arange(course.size)
-    powers = np.exp(-4 * (np.pi * left.noise * _K[:HARMONICS]) ** 2) / (_K[:HARMONICS] * np.pi) ** 2 / 2
-    total = np.zeros((len(columns), len(columns)))
-    for first in (np.arange(PLACES) + 0.5) / PLACES:
-        place = (np.arange(-2, count + 2) + first) / left.samples * size
-        at = np.interp(place, np.arange(size), course, period=size)
-        for k, power in enumerate(powers, 1):
-            wave = np.exp(2j * np.pi * k * at)
-            if left.samples < DENSE * size:
-                error = np.interp(grid, place, wave)
-            else:
-                part = np.round(place).astype(np.int64) % grid.size
-                error = np.bincount(part, wave.real, grid.size) + 1j * np.bincount(part, wave.imag, grid.size)
-                error = error / np.bincount(part, minlength=grid.size)
-            moved = columns @ error
-            total += power / PLACES * np.real(np.outer(moved, moved.conj()))
-    return total

@@ -1,4 +1,4 @@
-"""Units of sensors: numbers such as `12 mV`, gains such as `100 mV/(N m)`, and from a reading to what it measures.
+"""Units of sensors: amounts such as `12 mV`, gains such as `100 mV/(N m)`, and from a reading to what it measures.
 
 The table of units is the model's; here volts, ampere, kelvin and hertz count too.
 """
@@ -20,13 +20,14 @@ from trunnion.model.names import nearest
 from trunnion.model.units import BASES, UnitError, normalise, pound_feet, root, si_unit, unit
 
 __all__ = [
-    "Amount", "Dimensions", "Frequency", "MeasureText", "Number", "SensorScale", "UnitText", "alike", "default_unit",
+    "HERTZ", "ZERO", "Amount", "Angle", "AngleUnit", "AngularSpeed", "Dimensions", "Frequency", "MeasureText", "Number",
+    "Positive", "SensorScale", "Share", "Size", "Step", "Time", "TimeUnit", "UnitText", "alike", "default_unit",
     "dimensions", "multiplied", "read_amount", "scale", "unit_name",
 ]  # fmt: skip
 
 Dimensions = Mapping[str, Fraction]
 HERTZ: Dimensions = {"s": Fraction(-1)}
-_VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}
+VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}
 _AMOUNT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _RATIO = re.compile(r"([^/()]+?)\s*/\s*\(\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*([^/()0-9][^()]*)\)", re.DOTALL)
 _EXAMPLE = "write a number with its unit and a decimal point, such as 12.5 mV"
@@ -45,6 +46,9 @@ class Amount:
     def plain(self) -> bool:
         """Whether no unit is stated."""
         return not self.unit
+
+
+ZERO = Amount(0.0, 0.0, "", {})
 
 
 def dimensions(text: str) -> tuple[float, Dimensions]:
@@ -97,7 +101,7 @@ def multiplied(first: Dimensions, second: Dimensions, sign: int = 1) -> Dimensio
 def unit_name(exponents: Dimensions) -> str:
     """SI unit of dimensions, in short."""
     exponents = {key: power for key, power in exponents.items() if power}
-    if exponents == dict(_VOLT):
+    if exponents == dict(VOLT):
         return "V"
     if exponents.keys() <= set(BASES[:4]):
         length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in BASES[:4])
@@ -113,7 +117,7 @@ def _entry(read: Callable[[Any], Any]) -> PlainValidator:
 
     def check(value: object) -> Any:
         try:
-            return read(value)
+            return value if isinstance(value, Amount) else read(value)
         except UnitError as error:
             raise problem(error.what, error.remedy or _EXAMPLE) from None
 
@@ -127,23 +131,35 @@ def _unit(value: object) -> str:
     return value
 
 
+def _in(si: str, example: str) -> AfterValidator:
+    """Units, and amounts with one, that measure the same as that of SI."""
+
+    def check(entry: Amount | str) -> Amount | str:
+        text = entry.unit if isinstance(entry, Amount) else entry
+        if text and not alike(dimensions(text)[1], dimensions(si)[1] if si else {}):
+            what = f"the unit '{text}' is not {example.split(' such')[0]}"
+            raise problem(what, f"write {example}")
+        return entry
+
+    return AfterValidator(check)
+
+
+def _bounded(above: bool) -> AfterValidator:
+    """Amounts above zero, or else not below it."""
+
+    def check(amount: Amount) -> Amount:
+        if not (amount.value > 0 if above else amount.value >= 0):
+            remedy = "write a number above it, such as 100 N m or 0.1 deg" if above else "write it without a sign"
+            raise problem(f"{amount.source} is {'not above' if above else 'below'} zero", remedy)
+        return amount
+
+    return AfterValidator(check)
+
+
 def _hertz(amount: Amount) -> Amount:
     if not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
         raise problem(f"'{amount.source}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")
     return amount
-
-
-def bounded(above: bool) -> AfterValidator:
-    """Numbers above zero, or else not below it; of both kinds of quantities."""
-
-    def check(number: Any) -> Any:
-        value = number.value if isinstance(number, Amount) else float(number.evaluate())
-        if not (value > 0 if above else value >= 0):
-            remedy = "write a number above it, such as 100 N m or 0.1 deg" if above else "write it without a sign"
-            raise problem(f"{number.source} is {'not above' if above else 'below'} zero", remedy)
-        return number
-
-    return AfterValidator(check)
 
 
 def _measures(text: str) -> str:
@@ -157,14 +173,24 @@ def _measures(text: str) -> str:
     return text
 
 
-_WRITTEN, _SOURCE = {"type": ["number", "string"]}, PlainSerializer(lambda amount: amount.source)
-_AMOUNT_ENTRY = _entry(lambda value: value if isinstance(value, Amount) else read_amount(value))
+def _schema(example: str) -> WithJsonSchema:
+    return WithJsonSchema({"type": ["number", "string"], "examples": [example]})
+
+
+_READ, _SOURCE = _entry(read_amount), PlainSerializer(lambda amount: amount.source)
+_TIME, _ANGLE = _in("s", "a unit of time such as ms"), _in("rad", "a unit of angle such as deg")
 UnitText = Annotated[str, _entry(_unit), WithJsonSchema({"type": ["string"], "examples": ["mV"]})]
-Number = Annotated[Amount, _AMOUNT_ENTRY, _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["12 mV"]})]
-Positive = Annotated[Number, bounded(above=True)]
-Size = Annotated[Number, bounded(above=False)]
-_RATE = WithJsonSchema({**_WRITTEN, "examples": ["2 kHz"]})
-Frequency = Annotated[Amount, _AMOUNT_ENTRY, AfterValidator(_hertz), _SOURCE, _RATE]
+TimeUnit = Annotated[UnitText, _TIME]
+AngleUnit = Annotated[UnitText, _ANGLE]
+Number = Annotated[Amount, _READ, _SOURCE, _schema("12 mV")]
+Positive = Annotated[Number, _bounded(above=True)]
+Size = Annotated[Number, _bounded(above=False)]
+Frequency = Annotated[Amount, _READ, AfterValidator(_hertz), _SOURCE, _schema("2 kHz")]
+Time = Annotated[Number, _TIME]
+Angle = Annotated[Number, _ANGLE]
+Step = Annotated[Angle, _bounded(above=True)]
+AngularSpeed = Annotated[Number, _in("rad/s", "a unit of angular speed such as rpm")]
+Share = Annotated[Size, _in("", "a share such as 0.1 %")]
 MeasureText = Annotated[str, AfterValidator(_measures)]
 
 

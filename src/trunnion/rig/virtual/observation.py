@@ -1,50 +1,55 @@
-"""What a virtual rig has recorded: its working conditions, the errors of its sensors, and the readings they make."""
+"""What a virtual rig has recorded: its working conditions, the errors of its sensors, and the readings they make.
+
+It leaves data files like those of a real rig, the mapping that reads them, and the truth. CSV, Parquet and TDMS hold
+the same numbers to the last bit: they are rounded to what the shortest text of a CSV cell says before any is written.
+"""
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import os
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from pathlib import Path
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from ruamel.yaml import YAML
 
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measures.evaluation import courses_of
-from trunnion.measures.measures import Measure
+from trunnion.files import guard
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
-from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual import files
+from trunnion.rig.virtual.rig_file import FORMATS, Rig, Value
 from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, pulses, readings, stream
-from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.version import __version__
 
-__all__ = ["Case", "Observation", "check_seed", "phases", "solved", "speed_differs"]
+__all__ = [
+    "MAPPING", "TRUTH", "Case", "Observation", "Record", "check_folder", "check_form", "check_seed", "differ_in_speed",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 MOST_SEEDS = 1 << 128
-UNITS = {"s": (1.0, 9), "ms": (1e3, 6), "us": (1e6, 3)}  # of the time: in a second, and decimals
 POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
 FEWER = 0.99
 AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
-CHUNK = 8_192  # instants at once: memory and cache
-DIGITS = 12  # of a share of the cycle, in which instants that are one agree
+DECIMALS = 9  # of the time, s
 
 
 @dataclass(frozen=True)
 class Case:
     """A working condition that the model can be in: what is set, how it is sampled, what is true.
 
-    rate: samples a second; before, running, after: samples of the idle stretches and of the run; lead: sampling
-    intervals from the first sample of the run to the start of its first cycle, a whole number and a half; true:
-    (sensor, sample), courses of the run, SI; time, status: of the instants of the cycle at which the model is solved;
-    efficiency: of the model, NaN if it has none.
+    rate: samples a second; before, running: samples of the idle stretch and of the run; lead: sampling intervals from
+    the first sample of the run to the start of its first cycle, a whole number and a half; true: (sensor, sample),
+    courses of the run, SI; time, status: of the instants of the cycle at which the model is solved; efficiency: of the
+    model, NaN if it has none.
     """
 
     number: int
@@ -54,7 +59,6 @@ class Case:
     rate: float
     before: int
     running: int
-    after: int
     lead: float
     true: Array
     time: Array
@@ -68,12 +72,7 @@ class Case:
 
     @property
     def rows(self) -> int:
-        return self.before + self.running + self.after
-
-    @property
-    def part(self) -> slice:
-        """Samples at which the machine runs."""
-        return slice(self.before, self.before + self.running)
+        return self.before + self.running
 
     @property
     def cycle(self) -> float:
@@ -111,8 +110,16 @@ class Case:
     def __str__(self) -> str:
         """Its number, and what is set."""
         texts = {name: value if isinstance(value, str) else f"{value:.6g}" for name, value in self.settings.items()}
-        settings_text = ", ".join(f"{name} = {text}" for name, text in texts.items()) or "as the model states"
-        return f"condition {self.number} ({settings_text})"
+        settings = ", ".join(f"{name} = {text}" for name, text in texts.items()) or "as the model states"
+        return f"condition {self.number} ({settings})"
+
+
+class Record(NamedTuple):
+    """The columns of one file, by name; NaN is an empty cell. settings: what is set in it, as in the rig file."""
+
+    name: str
+    settings: Mapping[str, Value]
+    columns: Mapping[str, NDArray[Any]]
 
 
 @strict_arguments
@@ -128,16 +135,19 @@ class Observation:
     rig: Rig
     seed: int
     channels: Mapping[str, SensorChannel]
-    drawn: Mapping[str, SensorErrors]
     cases: tuple[Case, ...]
     skipped: tuple[int, ...]
     findings: tuple[Finding, ...]
 
+    @cached_property
+    def drawn(self) -> Mapping[str, SensorErrors]:
+        """The errors of the sensors."""
+        return {name: draw(channel, self.seed) for name, channel in self.channels.items()}
+
     def seeded(self, seed: int) -> Self:
         """The same with the random numbers of another seed: other errors of the sensors, other noise."""
         check_seed(seed)
-        drawn = {name: draw(channel, int(seed)) for name, channel in self.channels.items()}
-        return replace(self, seed=int(seed), drawn=drawn)
+        return replace(self, seed=int(seed))
 
     @property
     def rate(self) -> float:
@@ -152,34 +162,31 @@ class Observation:
     @property
     def units(self) -> dict[str, str]:
         """Unit of every column that has one."""
-        units = {self.rig.time.column: self.rig.time.unit}
-        return units | {channel.column: channel.reading for channel in self.channels.values()}
+        return {"t": "s"} | {channel.column: channel.reading for channel in self.channels.values()}
 
-    def records(self) -> Iterator[files.Record]:
+    def records(self) -> Iterator[Record]:
         """The readings of every condition, one after the other."""
-        return (self._record(case) for case in self.cases)
-
-    def _record(self, case: Case) -> files.Record:
-        rig, encoder, (factor, places) = self.rig, self.rig.encoder, UNITS[self.rig.time.unit]
-        time = (np.arange(case.rows) - case.origin) / self.rate * factor
-        columns: dict[str, NDArray[Any]] = {rig.time.column: np.round(time, places)}
-        if encoder:
-            angle, _ = case.drive(np.clip(np.arange(case.rows) - case.before, 0, case.running - 1))
-            count, part = pulses(angle, encoder.per_turn, float(encoder.zero.evaluate()))
-            columns[encoder.column] = count if encoder.kind == "count" else (part < 0.5).astype(np.int64)
-            if encoder.index:
-                columns[encoder.index] = (count % encoder.per_turn == 0).astype(np.int64)
-        columns |= {self.channels[name].column: values for name, values in self._readings(case).items()}
-        return files.Record(case.name, case.settings, columns)
+        for case in self.cases:
+            columns: dict[str, NDArray[Any]] = {
+                "t": np.round((np.arange(case.rows) - case.origin) / self.rate, DECIMALS)
+            }
+            if encoder := self.rig.encoder:
+                angle, _ = case.drive(np.maximum(np.arange(case.rows) - case.before, 0))
+                count, part = pulses(angle, encoder.per_turn)
+                columns[encoder.column] = count if encoder.kind == "count" else (part < 0.5).astype(np.int64)
+                if encoder.index:
+                    columns[encoder.index] = (count % encoder.per_turn == 0).astype(np.int64)
+            columns |= {self.channels[name].column: values for name, values in self._readings(case).items()}
+            yield Record(case.name, case.settings, columns)
 
     def _readings(self, case: Case) -> dict[str, Array]:
-        """Readings by sensor, in their units, idle stretches included."""
+        """Readings by sensor, in their units, the idle stretch included."""
         values = {}
         for (name, channel), course in zip(self.channels.items(), case.true, strict=True):
-            ends = (0.0, 0.0) if channel.at_rest else (course[0], course[-1])
-            true = np.concatenate([np.full(case.before, ends[0]), course, np.full(case.after, ends[1])])
+            true = np.concatenate([np.full(case.before, 0.0 if channel.at_rest else course[0]), course])
             noise = stream(self.seed, case.number, name, "noise").standard_normal(case.rows)
-            values[name] = readings(channel, true, case.part, self.rate, self.drawn[name], noise)
+            running = slice(case.before, case.rows)
+            values[name] = readings(channel, true, running, self.rate, self.drawn[name], noise)
         return values
 
     def accuracy(self, name: str) -> Accuracy:
@@ -193,8 +200,8 @@ class Observation:
         idle = channel.noise / math.sqrt(longest.before) if channel.zeroed and longest.before else channel.offset
         zero = math.hypot(channel.zero, abs(channel.drift) * longest.rows / self.rate / math.sqrt(3), idle)
         rests = channel.at_rest and all(case.before for case in self.cases)  # else all files have one offset
-        zero_part = math.sqrt(max(zero - channel.zero, 0.0) * (zero + channel.zero)) if rests else 0.0
-        return Accuracy(zero, channel.gain, channel.step, zero_part)
+        own = math.sqrt(max(zero - channel.zero, 0.0) * (zero + channel.zero)) if rests else 0.0
+        return Accuracy(zero, channel.gain, channel.step, own)
 
     def measurement(self, positions: int = 360) -> Measurement:
         """The readings as a Measurement, without files in between: the angle is the true one."""
@@ -205,26 +212,36 @@ class Observation:
                 channel, values = self.channels[name], values / self.channels[name].per
                 zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
                 by_turn = np.interp(at.ravel(), np.arange(case.rows), values - zero).reshape(at.shape)
-                courses[name] = Signal(name, channel.measures, channel.unit, by_turn, self.accuracy(name),
-                                       per_turn=channel.per_turn)  # fmt: skip
-            stated = {**self.rig.set_, **case.settings}
-            changed = self.mechanism.with_values(stated)
-            settings = {name: float(np.ravel(changed.parameters()[changed.path_of(name)])[0]) for name in stated}
-            conditions.append(Condition(case.name, settings, phase, courses, (), case.start[1]))
+                courses[name] = Signal(name, channel.sensor.measures, channel.unit, by_turn, self.accuracy(name),
+                                       per_turn=channel.sensor.per_turn or 0)  # fmt: skip
+            settings = {**self.rig.set_, **case.settings}
+            changed = self.mechanism.with_values(settings)
+            values_set = {name: float(np.ravel(changed.parameters()[changed.path_of(name)])[0]) for name in settings}
+            conditions.append(Condition(case.name, values_set, phase, courses, (), case.start[1]))
         return Measurement(self.rig.name, tuple(conditions), self.findings, ("made by a virtual rig, not read",))
 
     def mapping(self, form: str = "") -> dict[str, Any]:
         """The mapping that reads the files: what a laboratory knows, and no more than that."""
-        angle = _angle(self)
-        timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
-        least = min(case.cycle for case in self.cases) * self.rate
+        case, encoder = self.cases[0], self.rig.encoder
+        timed = not case.named or (encoder is None and not differ_in_speed(self.cases))
+        entries = []
+        for item in self.cases:
+            entry: dict[str, Any] = {"file": f"{item.name}.{form or self.rig.format}"}
+            if item.settings:
+                entry["set"] = dict(item.settings)
+            if encoder and (zero := _zero(self, item)) != _zero(self, case):
+                entry["angle"] = {"zero": _degrees(zero)}
+            if timed and item.before:  # where the time alone tells the position: when it ran
+                ends = (item.before - item.origin, item.rows - 1 - item.origin)
+                entry["over"] = [f"{end / item.rate:.9g} s" for end in ends]
+            entries.append(entry)
+        least = min(item.cycle for item in self.cases) * self.rate
         positions = next((item for item in POSITIONS if item < least * FEWER), POSITIONS[-1])
         return {
-            "trunnion-data": 1, "name": self.rig.name or self.mechanism.name,
-            "files": [_file(self, case, form or self.rig.format, timed) for case in self.cases],
+            "trunnion-data": 1, "name": self.rig.name or self.mechanism.name, "files": entries,
             **({"set": dict(self.rig.set_)} if self.rig.set_ else {}),
-            "time": {"column": self.rig.time.column, "unit": self.rig.time.unit},
-            **angle,
+            "time": {"column": "t", "unit": "s"},
+            **_angle(self),
             **({"positions": positions} if positions != POSITIONS[0] else {}),
             "channels": {name: _channel(self, name) for name in self.channels},
         }  # fmt: skip
@@ -235,7 +252,7 @@ class Observation:
         for name, channel in self.channels.items():
             errors = self.drawn[name]
             sensors[name] = {
-                "measures": channel.measures, "unit": channel.unit, "gain_error": errors.gain,
+                "measures": channel.sensor.measures, "unit": channel.unit, "gain_error": errors.gain,
                 "zero_error": errors.zero, "offset": errors.offset,
                 "drift_per_second": float(f"{channel.drift:.12g}"), "noise": float(f"{channel.noise:.12g}"),
                 "step": float(f"{channel.step:.12g}"),
@@ -258,15 +275,41 @@ class Observation:
     def write(
         self, folder: str | os.PathLike[str], form: str = "", progress: Callable[[int], None] | None = None
     ) -> list[str]:
-        """Write a file for each condition, `mapping.yaml` and `truth.yaml` into a folder; their names.
+        """Write a file for each condition, `mapping.yaml` and `truth.yaml` into a folder, once all are complete.
 
-        form: csv, parquet or tdms, that of the rig file if not given; progress: called with the files written.
+        Parameters
+        ----------
+        folder : made if it is not there.
+        form : csv, parquet or tdms, that of the rig file if not given.
+        progress : called with the files written.
+
+        Returns
+        -------
+        The names of the files.
         """
-        form = form or self.rig.format
-        files.check_form(form)
-        files.check_folder(self.rig, folder, form)
-        texts = {files.MAPPING: self.mapping(form), files.TRUTH: self.truth()}
-        return files.write(self.records(), self.units, texts, folder, form, progress or (lambda count: None))
+        form, folder, names = form or self.rig.format, Path(folder), []
+        check_form(form)
+        check_folder(self.rig, folder, form)
+        home = next(item for item in (folder, *folder.absolute().parents) if item.exists())
+        if not home.is_dir():
+            raise MechanismError(Finding("cannot be made a folder: it is a file", str(home), "name a folder"))
+        try:
+            with tempfile.TemporaryDirectory(prefix=".rig-", dir=home, ignore_cleanup_errors=True) as new:
+                for done, record in enumerate(self.records(), 1):
+                    names.append(f"{record.name}.{form}")
+                    WRITERS[form](record, self.units, Path(new) / names[-1])
+                    if progress:
+                        progress(done)
+                for name, entries in ((MAPPING, self.mapping(form)), (TRUTH, self.truth())):
+                    names.append(name)
+                    _write_yaml(Path(new) / name, entries)
+                folder.mkdir(parents=True, exist_ok=True)
+                for path in sorted(Path(new).iterdir()):
+                    path.replace(folder / path.name)
+        except OSError as error:
+            what = f"cannot be written: {error.strerror or error}"
+            raise MechanismError(Finding(what, str(folder), "make room there, or name another folder")) from None
+        return names
 
 
 def check_seed(seed: int) -> None:
@@ -275,11 +318,11 @@ def check_seed(seed: int) -> None:
         raise MechanismError(Finding(f"the seed {seed} is no whole number from 0", "seed", "give one such as 1"))
 
 
-def speed_differs(cases: Sequence[Case]) -> bool:
+def differ_in_speed(cases: Sequence[Case]) -> bool:
     """Whether the first driver runs one way and not as fast in all conditions."""
-    durations = [case.cycle for case in cases]
-    one_way = cases[0].run.system.span(cases[0].run.values, cases[0].driver).one_way
-    return one_way and max(durations) - min(durations) > 1e-9 * max(durations)
+    case, durations = cases[0], [case.cycle for case in cases]
+    one_way = case.run.system.span(case.run.values, case.driver).one_way
+    return bool(one_way) and max(durations) - min(durations) > 1e-9 * max(durations)
 
 
 # ---- the mapping ----------------------------------------------------------------------------------------------------
@@ -287,19 +330,6 @@ def speed_differs(cases: Sequence[Case]) -> bool:
 
 def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.12g} deg"
-
-
-def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[str, Any]:
-    """A file with what was set, its zero of an encoder, and where the time alone tells the position, when it ran."""
-    entry: dict[str, Any] = {"file": f"{case.name}.{form}"}
-    if case.settings:
-        entry["set"] = dict(case.settings)
-    if observation.rig.encoder and (zero := _zero(observation, case)) != _zero(observation, observation.cases[0]):
-        entry["angle"] = {"zero": _degrees(zero)}
-    if timed and case.rows > case.running:
-        ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
-        entry["over"] = [f"{end / case.rate:.9g} s" for end in ends]
-    return entry
 
 
 def _angle(observation: Observation) -> dict[str, Any]:
@@ -318,14 +348,15 @@ def _angle(observation: Observation) -> dict[str, Any]:
             source["zero"] = _degrees(zero)
         if encoder.index:
             source["index"] = {"column": encoder.index}
-    elif speed_differs(observation.cases):
-        speeds = (name for name, channel in observation.channels.items() if channel.measures == f"rate:{case.driver}")
-        source = {"from": "speed", "channel": next(speeds)}
+    elif differ_in_speed(observation.cases):
+        channels = observation.channels.items()
+        speed = next(name for name, channel in channels if channel.sensor.measures == f"rate:{case.driver}")
+        source = {"from": "speed", "channel": speed}
         if case.start[0]:
             source["zero"] = _degrees(case.start[0])
     else:
-        angle, speed = (float(item.flat[0]) for item in case.drive(-case.before))
-        source = {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": _degrees(angle)}
+        angle, rate = (float(item.flat[0]) for item in case.drive(-case.before))
+        source = {"from": "time", "speed": f"{rate:.15g} rad/s", "zero": _degrees(angle)}
     entries: dict[str, Any] = {"angle": source}
     if abs(abs(last - first) - 2 * math.pi) > 1e-11:
         entries["cycle"] = _degrees(abs(last - first))
@@ -335,32 +366,30 @@ def _angle(observation: Observation) -> dict[str, Any]:
 def _zero(observation: Observation, case: Case) -> float:
     """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
     encoder, (start, speed) = observation.rig.encoder, case.start
-    assert encoder is not None  # asked of encoders only
-    zero, pitch = float(encoder.zero.evaluate()), 2 * math.pi / encoder.per_turn
+    if encoder is None or (encoder.kind == "count" and not encoder.index):
+        return 0.0
+    pitch = 2 * math.pi / encoder.per_turn
     if encoder.index:
-        return zero if speed > 0 else zero + pitch  # backward, the first pulse is entered at its far end
-    if encoder.kind == "count":
-        return zero
-    count = (start - zero) / pitch
+        return 0.0 if speed > 0 else pitch  # backward, the first pulse is entered at its far end
     # backward, the level rises in the middle of a pulse
-    edge = math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5
-    return zero + edge * pitch
+    count = start / pitch
+    return pitch * (math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5)
 
 
 def _channel(observation: Observation, name: str) -> dict[str, Any]:
-    channel, case = observation.channels[name], observation.cases[0]
-    channel_stated, zero = channel.stated, observation.accuracy(name).zero
-    entry: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
-    if channel_stated.sensitivity:
-        entry["gain"] = channel_stated.sensitivity.source
+    channel, case, zero = observation.channels[name], observation.cases[0], observation.accuracy(name).zero
+    sensor = channel.sensor
+    entry: dict[str, Any] = {"column": channel.column, "measures": sensor.measures, "unit": channel.reading}
+    if sensor.sensitivity:
+        entry["gain"] = sensor.sensitivity.source
     if channel.zeroed and case.before > 1:
         rest = (-case.origin, AT_REST * case.before - case.origin)
         entry["zero"] = {"over": [f"{item / case.rate + 0.0:.6g} s" for item in rest]}
-    if channel_stated.range:
-        entry["range"] = channel_stated.range.source
-    if channel.per_turn:
-        entry["per_turn"] = channel.per_turn
-    accuracy: dict[str, Any] = {"gain": channel_stated.accuracy.gain.source} if channel.gain else {}
+    if sensor.range:
+        entry["range"] = sensor.range.source
+    if sensor.per_turn:
+        entry["per_turn"] = sensor.per_turn
+    accuracy: dict[str, Any] = {"gain": sensor.accuracy.gain.source} if channel.gain else {}
     if channel.noise <= channel.step / 2:  # which does not carry readings over the steps of the converter
         zero = math.hypot(zero, channel.step / math.sqrt(12))  # GUM F.2.2.1
     if zero:
@@ -368,44 +397,78 @@ def _channel(observation: Observation, name: str) -> dict[str, Any]:
     return entry | ({"accuracy": accuracy} if accuracy else {})
 
 
-# ---- true courses ----------------------------------------------------------------------------------------------
+# ---- files ----------------------------------------------------------------------------------------------------------
+
+MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
+HEADS = {
+    MAPPING: "# What the columns of the data files measure: for `trunnion data`, `compare` and `identify`.\n",
+    TRUTH: "# True values and random errors of the virtual rig, in SI, to check results obtained from the files.\n",
+}
+PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
 
 
-def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]]:
-    """Distinct times (s) in the cycle of `count` samples, ascending, and the place of each sample among them.
+def check_form(form: str) -> None:
+    """MechanismError for a format that is none, or whose package is not there."""
+    if form not in FORMATS:
+        raise MechanismError(Finding(f"'{form}' is no format of data files", "format", f"use {', '.join(FORMATS)}"))
+    if form in PACKAGES and importlib.util.find_spec(PACKAGES[form]) is None:
+        raise MechanismError(Finding(f"{form} needs {PACKAGES[form]}", "format", f"pip install 'trunnion[{form}]'"))
 
-    lead: how many sampling intervals the first comes before the start of the cycle.
+
+def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str) -> None:
+    """MechanismError if a file of a rig would be written over one that is read, or over one that no rig has written.
+
+    What is in a folder with a truth that a rig has written is a rig's: its files are written anew.
     """
-    share = np.round(np.mod((np.arange(count) - lead) / (duration * rate), 1.0), DIGITS) % 1.0
-    distinct, place = np.unique(share, return_inverse=True)
-    return distinct * duration, place
+    paths = [Path(folder) / name for name in (*(f"{name}.{form or rig.format}" for name in rig.names), MAPPING, TRUTH)]
+    for path in paths:
+        guard(path)
+    truth, strange = paths[-1], [path.name for path in paths if path.exists()]
+    if strange and not (truth.is_file() and truth.read_bytes().startswith(HEADS[TRUTH].encode())):
+        what = f"{', '.join(strange[:3])}{' …' * (len(strange) > 3)} would be written over, and is of no virtual rig"
+        raise MechanismError(Finding(what, str(folder), "name another folder, or move away what is there"))
 
 
-def solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8]]:
-    """Courses of measures, (measure, instant), at ascending times (s) of the cycle, with pins in their seats; status.
+def _write_yaml(path: Path, data: dict[str, Any]) -> None:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None if path.name == MAPPING else False  # the innermost groups on one line
+    yaml.allow_unicode = True
+    yaml.width = 118
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(HEADS[path.name])
+        yaml.dump(data, stream)
 
-    Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
-    joint rests at several positions on end is 0 there: nothing moves against it.
-    """
-    alike, periodic = list({measure.name: measure for measure in measures}.values()), run.cycle.periodic
-    values, status = np.empty((len(measures), len(time))), np.empty(len(time), np.int8)
-    for low in range(0, len(time), CHUNK):
-        part = slice(low, low + CHUNK)
-        curves, status[part] = courses_of(run, alike, time[part], FrictionMethod())
-        for row, measure in zip(values, measures, strict=True):
-            row[part] = curves[measure.name][0]
-    lost = status >= Status.NOT_CONVERGED
-    values[:, lost] = np.nan
-    for row, measure in zip(values, measures, strict=True) if not lost.any() else ():
-        gaps = ~np.isfinite(row)
-        if measure.kind == "load":
-            before, after = np.roll(gaps, 1), np.roll(gaps, -1)
-            if not periodic:
-                before[0] = after[-1] = False
-            row[gaps & (before | after)] = 0.0  # of more than one position; at the ends of a period too
-        finite = np.isfinite(row)
-        if finite.any() and not finite.all():
-            row[~finite] = np.interp(
-                time[~finite], time[finite], row[finite], period=run.cycle.duration * periodic or None
-            )
-    return values, status
+
+def _csv(record: Record, units: Mapping[str, str], path: Path) -> None:
+    """Text, a column's unit in brackets behind its name, in quotes where it needs them; an empty cell: no reading."""
+    head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        quoted = ('"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name for name in head)
+        stream.write(",".join(quoted) + "\n")
+        texts = [["" if item != item else repr(item) for item in row.tolist()] for row in record.columns.values()]
+        stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
+
+
+def _parquet(record: Record, units: Mapping[str, str], path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = {name: pa.array(values, from_pandas=True) for name, values in record.columns.items()}  # NaN as null
+    fields = [pa.field(name, column.type, metadata={"unit": units[name]} if name in units else None)
+              for name, column in columns.items()]  # fmt: skip
+    pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), path)
+
+
+def _tdms(record: Record, units: Mapping[str, str], path: Path) -> None:
+    from nptdms import ChannelObject, RootObject, TdmsWriter
+
+    objects = [ChannelObject("rig", name, values, properties={"unit_string": units[name]} if name in units else {})
+               for name, values in record.columns.items()]  # fmt: skip
+    with TdmsWriter(str(path)) as stream:
+        stream.write_segment([RootObject(properties={"name": record.name}), *objects])
+
+
+WRITERS: dict[str, Callable[[Record, Mapping[str, str], Path], None]] = {
+    "csv": _csv, "parquet": _parquet, "tdms": _tdms,
+}  # fmt: skip

@@ -18,25 +18,31 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.cycle.positions import positions
 from trunnion.errors import Finding, MechanismError, Severity, Status, counted
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.rig.modelled import each, measure_of
-from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual.observation import Case, Observation, check_seed, phases, solved, speed_differs
-from trunnion.rig.virtual.sensors import SensorChannel, draw, resolved
+from trunnion.rig.virtual.observation import Case, Observation, check_seed, differ_in_speed
+from trunnion.rig.virtual.rig_file import Rig, Value
+from trunnion.rig.virtual.sensors import SensorChannel, resolved
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Observation", "observe"]
+__all__ = ["Observation", "observe", "phases"]
 
+Array = NDArray[np.float64]
 MOST_ROWS = 20_000_000
 EFFICIENCY_STEPS = 720
 MOST_NAMED = 20  # conditions in one finding
 BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
+CHUNK = 8_192  # instants at once: memory and cache
+DIGITS = 12  # of a share of the cycle, in which instants that are one agree
 
 
 @strict_arguments
@@ -73,8 +79,7 @@ def observe(
     channels: dict[str, SensorChannel] = {}
     cases: list[Case] = []
     for number, (name, row) in enumerate(zip(rig.names, rows, strict=True), 1):
-        key = f"conditions.{number - 1}" if rig.schedule.conditions else "over"
-        with _placed(f"schedule.{key}", number):
+        with _placed(f"schedule.{f'conditions.{number - 1}' if rig.schedule.conditions else 'over'}", number):
             run = prepare(mechanism.with_values(dict(row)) if row else mechanism)
         measures = _measures(rig, run)
         channels = channels or _channels(rig, run, measures)
@@ -90,8 +95,7 @@ def observe(
     if any(finding.severity is Severity.ERROR for finding in findings):
         raise MechanismError(findings)
     skipped = tuple(case.number for case in cases if not case.worst.solved)
-    drawn = {name: draw(channel, int(seed)) for name, channel in channels.items()}
-    return Observation(mechanism, rig, int(seed), channels, drawn, sound, skipped, findings)
+    return Observation(mechanism, rig, int(seed), channels, sound, skipped, findings)
 
 
 @contextmanager
@@ -107,14 +111,10 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
         ) from None
 
 
-# ---- what the rig makes of the mechanism ----------------------------------------------------------------------
-
-
 def _measures(rig: Rig, run: Run) -> list[Measure]:
     """What each sensor measures; MechanismError with all that the model has no course of."""
-    measures = each(
-        rig.sensors.items(), lambda item: measure_of(run.system.mechanism, run, item[0], item[1].measures, "sensors")
-    )
+    mechanism, sensors = run.system.mechanism, rig.sensors.items()
+    measures = each(sensors, lambda item: measure_of(mechanism, run, item[0], item[1].measures, "sensors"))
     if run.determinacy is not None and not all(measure.of_motion for measure in measures):
         run.determinacy.refuse()
     return measures
@@ -122,8 +122,8 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
 
 def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
     """The sensors in the units of what they measure; MechanismError with all that does not fit."""
-    channel_pairs = zip(rig.sensors.items(), measures, strict=True)
-    every = each(channel_pairs, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(run.system)))
+    pairs = zip(rig.sensors.items(), measures, strict=True)
+    channels = each(pairs, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(run.system)))
     findings: list[Finding] = []
     driver = next(iter(run.system.mechanism.drivers), None)
     if driver is None or run.cycle.duration <= 0:
@@ -136,24 +136,24 @@ def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, Sens
         findings.append(Finding(what, "encoder", "remove the encoder: positions then follow from the time"))
     if findings:
         raise MechanismError(findings)
-    return {item.name: item for item in every}
+    return {channel.name: channel for channel in channels}
 
 
 def _case(
     number: int, name: str, row: Mapping[str, Value], run: Run, rig: Rig, measures: Sequence[Measure],
     channels: Mapping[str, SensorChannel],
 ) -> Case:  # fmt: skip
-    """One condition with its true courses. The idle times are taken to a whole number of samples."""
-    rate, cycle, pauses = rig.rate.value, run.cycle, rig.schedule.pauses
-    before, after = (math.ceil(float(item.evaluate()) * rate - 1e-9) for item in (pauses.before, pauses.after))
+    """One condition with its true courses. The idle time is taken to a whole number of samples."""
+    rate, cycle = rig.rate.value, run.cycle
+    before = math.ceil(rig.schedule.idle.value * rate - 1e-9)
     # Samples lie half an interval off the start of the cycle, so that edges of pulses that fall on samples otherwise
     # lie between them: a sampling clock knows nothing of the shaft.
     lead = math.ceil(BEYOND * cycle.duration * rate) - 0.5 if cycle.periodic else 0.0
     running = math.floor(cycle.duration * rate + 1e-9) + 1
     if cycle.periodic:
         running = math.ceil(lead) + math.ceil((rig.schedule.turns + BEYOND) * cycle.duration * rate)
-    if before + running + after > MOST_ROWS:
-        what = f"condition {number} takes {before + running + after:,} rows, a file at most {MOST_ROWS:,}"
+    if before + running > MOST_ROWS:
+        what = f"condition {number} takes {before + running:,} rows, a file at most {MOST_ROWS:,}"
         raise MechanismError(Finding(what, "rate", "sample more slowly, or fewer turns"))
     if running < 3:
         what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
@@ -161,16 +161,59 @@ def _case(
     time, place = np.minimum(np.arange(running) / rate, cycle.duration), np.arange(running)
     if cycle.periodic:
         time, place = phases(cycle.duration, rate, running, lead)
-    values, status = solved(run, measures, time)
-    case = Case(number, name, row, run, rate, before, running, after, lead, values[:, place], time, status)
+    values, status = _solved(run, measures, time)
+    case = Case(number, name, row, run, rate, before, running, lead, values[:, place], time, status)
     if not case.worst.solved:
         return case
-    for course, (sensor, channel) in zip(values, channels.items(), strict=True):
-        if channel.per_turn and np.min(course) < 0 < np.max(course):
+    for course, channel in zip(values, channels.values(), strict=True):
+        if channel.sensor.per_turn and np.min(course) < 0 < np.max(course):
             what = f"in {case} the speed changes its sign, which pulses do not show"
             remedy = "remove per_turn, or measure another joint"
-            raise MechanismError(Finding(what, f"sensors.{sensor}.per_turn", remedy))
+            raise MechanismError(Finding(what, f"sensors.{channel.name}.per_turn", remedy))
     return replace(case, efficiency=positions(run, EFFICIENCY_STEPS, margin=False).means.efficiency)
+
+
+# ---- true courses ----------------------------------------------------------------------------------------------
+
+
+def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]]:
+    """Distinct times (s) in the cycle of `count` samples, ascending, and the place of each sample among them.
+
+    lead: how many sampling intervals the first comes before the start of the cycle.
+    """
+    share = np.round(np.mod((np.arange(count) - lead) / (duration * rate), 1.0), DIGITS) % 1.0
+    distinct, place = np.unique(share, return_inverse=True)
+    return distinct * duration, place
+
+
+def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8]]:
+    """Courses of measures, (measure, instant), at ascending times (s) of the cycle, with pins in their seats; status.
+
+    Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
+    joint rests at several positions on end is 0 there: nothing moves against it.
+    """
+    single, periodic = list({measure.name: measure for measure in measures}.values()), run.cycle.periodic
+    values, status = np.empty((len(measures), len(time))), np.empty(len(time), np.int8)
+    for low in range(0, len(time), CHUNK):
+        part = slice(low, low + CHUNK)
+        curves, status[part] = courses_of(run, single, time[part], FrictionMethod())
+        for row, measure in zip(values, measures, strict=True):
+            row[part] = curves[measure.name][0]
+    lost = status >= Status.NOT_CONVERGED
+    values[:, lost] = np.nan
+    for row, measure in zip(values, measures, strict=True) if not lost.any() else ():
+        gaps = ~np.isfinite(row)
+        if measure.kind == "load":
+            before, after = np.roll(gaps, 1), np.roll(gaps, -1)
+            if not periodic:
+                before[0] = after[-1] = False
+            row[gaps & (before | after)] = 0.0  # of more than one position; at the ends of a period too
+        finite = np.isfinite(row)
+        if finite.any() and not finite.all():
+            row[~finite] = np.interp(
+                time[~finite], time[finite], row[finite], period=run.cycle.duration * periodic or None
+            )
+    return values, status
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
@@ -183,53 +226,45 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
         if stopped := [case for case in cases if case.worst == status and not status.solved]:
             case = stopped[0]
             lost = np.flatnonzero(case.status >= Status.NOT_CONVERGED)
-            what = f"{_which(stopped)} {'is' if len(stopped) == 1 else 'are'} left out: {status.text}; in condition "
-            what += f"{case.number} at {len(lost)} of {counted(len(case.status), 'position')}, first at "
+            what = f"{_which(stopped)} left out: {status.text}; in condition {case.number} at {len(lost)} of "
+            what += f"{counted(len(case.status), 'position')}, first at "
             what += f"{360 * case.time[lost[0]] / case.cycle:.4g}° of the cycle"
             remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
             yield Finding.warning("rig.no_answer", where, what, remedy)
     if not (sound := [case for case in cases if case.worst.solved]):
         return
-    yield from _of_encoder(sound, channels, rig)
-    for i, (name, channel) in enumerate(channels.items()):
-        peaks = {case.number: float(np.max(np.abs(case.true[i]))) for case in sound}
-        if clipped := [case for case in sound if peaks[case.number] > channel.limit]:
-            key = "range" if channel.limit == channel.range else "span"
-            peak, limit = (readable(size, channel.unit) for size in (max(peaks.values()), channel.limit))
-            what = f"{_which(clipped)}: {channel.measures} reaches {peak}, beyond the range of {limit}: readings are "
-            remedy = "use a sensor with a larger range"
-            yield Finding.warning("rig.clipped", f"sensors.{name}.{key}", f"{what}clipped", remedy)
-
-
-def _of_encoder(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig: Rig) -> Iterator[Finding]:
-    """Whether the angle of the driver can be known from what is recorded."""
-    driver, encoder, rate = cases[0].driver, rig.encoder, rig.rate.value
+    driver, encoder, rate = sound[0].driver, rig.encoder, rig.rate.value
     level = encoder is not None and encoder.kind == "level"
     if encoder is not None and level:
-        turning = [float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in cases]
-        rates = [encoder.per_turn * item for item in turning]
-        if lost := [case for case, item in zip(cases, rates, strict=True) if 4 * item > rate * (1 + 1e-9)]:
-            what = f"{_which(lost)}: some encoder pulses are lost: up to {max(rates):.4g} pulses per second, sampled "
+        peaks = [float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in sound]
+        if lost_pulses := [case for case, peak in zip(sound, peaks, strict=True)
+                           if 4 * encoder.per_turn * peak > rate * (1 + 1e-9)]:  # fmt: skip
+            what = f"{_which(lost_pulses)}: some encoder pulses are lost: up to {encoder.per_turn * max(peaks):.4g} "
             remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
-            yield Finding.warning("rig.pulses_lost", "encoder.kind", f"{what}at {rate:.4g} Hz", remedy)
-    if len({case.start[1] > 0 for case in cases if case.named}) > 1 and (encoder is None or level):
-        what = "the conditions turn in both directions, and "
-        what += "the level of an encoder does not tell them" if level else "no channel measures the angle of the driver"
+            what += f"pulses per second, sampled at {rate:.4g} Hz"
+            yield Finding.warning("rig.pulses_lost", "encoder.kind", what, remedy)
+    if len({case.start[1] > 0 for case in sound if case.named}) > 1 and (encoder is None or level):
+        what = "the conditions turn in both directions, which only a count of pulses shows"
         remedy = "state an encoder of kind: count, or one rig for each direction"
         yield Finding.error("rig.both_ways", "encoder.kind" if level else "encoder", what, remedy)
-    if (
-        not encoder
-        and speed_differs(cases)
-        and f"rate:{driver}" not in {channel.measures for channel in channels.values()}
-    ):
+    measured = {channel.sensor.measures for channel in channels.values()}
+    if not encoder and differ_in_speed(sound) and f"rate:{driver}" not in measured:
         what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
         yield Finding.error("rig.no_angle", "encoder", what, f"state an encoder, or a sensor of rate:{driver}")
+    for i, (name, channel) in enumerate(channels.items()):
+        highest = {case.number: float(np.max(np.abs(case.true[i]))) for case in sound}
+        if clipped := [case for case in sound if highest[case.number] > channel.limit]:
+            key = "range" if channel.limit == channel.range else "span"
+            peak, limit = (readable(size, channel.unit) for size in (max(highest.values()), channel.limit))
+            what = (
+                f"{_which(clipped)}: {channel.sensor.measures} reaches {peak}, beyond the range of {limit}: readings "
+            )
+            remedy = "use a sensor with a larger range"
+            yield Finding.warning("rig.clipped", f"sensors.{name}.{key}", f"{what}are clipped", remedy)
 
 
 def _which(cases: Sequence[Case]) -> str:
     """Conditions by number, the first with what is set."""
-    if len(cases) == 1:
-        return str(cases[0])
-    numbers = ", ".join(str(case.number) for case in cases[1:MOST_NAMED])
+    others = ", ".join(str(case.number) for case in cases[1:MOST_NAMED])
     more = f" and {len(cases) - MOST_NAMED} more" if len(cases) > MOST_NAMED else ""
-    return f"{cases[0]} and condition{'s' * (len(cases) > 2)} {numbers}{more}"
+    return f"{cases[0]}{f' and {others}' if others else ''}{more}"

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.rig_file import Sensor
 from trunnion.rig.reading.units import SensorScale, alike, dimensions, multiplied
 from trunnion.rig.reading.units import scale as scale_of
+from trunnion.rig.virtual.rig_file import Sensor
 
-__all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
+__all__ = ["SensorChannel", "SensorErrors", "converted", "draw", "pulsed", "pulses", "readings", "resolved", "stream"]
 
 Array = NDArray[np.float64]
 READINGS = ("V", "A", "Hz")  # what the reading of a sensor with a sensitivity may be in
@@ -33,40 +33,44 @@ FINE = 1e-3  # of a step of the converter, or of the noise: decimals of a readin
 class SensorChannel:
     """A sensor put to a mechanism: its numbers in the SI unit of what it measures.
 
-    unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0 where the sensitivity
-    is; zero: standard uncertainty while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a
-    converter; range and span: inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the
-    file.
+    sensor: as in the file; unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0
+    where the sensitivity is; range and span: inf without one; zero: standard uncertainty while it runs; offset: of what
+    it reads at rest; drift: per second.
     """
 
     name: str
+    sensor: Sensor
     column: str
-    measures: str
     unit: str
     reading: str
     per: float
     range: float
-    noise: float
-    step: float
     span: float
-    gain: float
-    zero: float
+    noise: float
     offset: float
+    zero: float
     drift: float
-    bandwidth: float | None
-    per_turn: int
-    stated: Sensor
+
+    @property
+    def gain(self) -> float:
+        """Its standard uncertainty, relative."""
+        return self.sensor.accuracy.gain.value
+
+    @property
+    def step(self) -> float:
+        """Of its converter; 0 without one."""
+        return 2 * self.span / 2**self.sensor.bits if self.sensor.bits else 0.0
 
     @property
     def at_rest(self) -> bool:
         """Whether it reads zero in an idle machine: what it measures is a force, a torque or a speed."""
-        kind = MEASURES.get(self.measures.partition(":")[0])
+        kind = MEASURES.get(self.sensor.measures.partition(":")[0])
         return kind is not None and kind.at_rest
 
     @property
     def zeroed(self) -> bool:
         """Whether its zero is taken from an idle stretch: pulses have none."""
-        return self.at_rest and not self.per_turn
+        return self.at_rest and not self.sensor.per_turn
 
     @property
     def limit(self) -> float:
@@ -115,29 +119,23 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
     except UnitError as error:
         where = f"sensors.{name}.{'sensitivity' if sensor.sensitivity else 'unit'}"
         raise MechanismError(Finding(error.what, where, error.remedy)) from None
-    quantities = {"range": sensor.range, "span": sensor.span, "noise": sensor.noise, "offset": sensor.offset,
-                  "accuracy.zero": sensor.accuracy.zero, "drift": sensor.drift}  # fmt: skip
-    sizes, findings = dict.fromkeys(quantities, math.inf), list[Finding]()
-    for key, amount in ((key, amount) for key, amount in quantities.items() if amount is not None):
+    amounts = {"range": sensor.range, "span": sensor.span or sensor.range, "noise": sensor.noise,
+               "offset": sensor.offset, "accuracy.zero": sensor.accuracy.zero, "drift": sensor.drift}  # fmt: skip
+    sizes, findings = dict.fromkeys(amounts, math.inf), list[Finding]()
+    for key, amount in amounts.items():
+        if amount is None or (key == "span" and not sensor.bits):
+            continue
         over = "/s" * (key == "drift")  # which has a sign; others have none
         per_second = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
         factor = scale.factor if over else abs(scale.factor)
         try:  # of what is measured, or of the readings
             sizes[key] = amount.value if amount.plain else factor * scale.reading(per_second, "zero" if over else key)
         except UnitError:
-            units = dict.fromkeys(f"{item}{over}" for item in (unit, reading))
-            what = f"'{amount.source}' is not in {' or in '.join(units)}"
-            remedy = f"state it in {', or as a reading in '.join(units)}"
-            findings.append(Finding(what, f"sensors.{name}.{key}", remedy))
+            units = " or as a reading in ".join(dict.fromkeys(f"{item}{over}" for item in (unit, reading)))
+            findings.append(Finding(f"'{amount.source}' is not in {units}", f"sensors.{name}.{key}"))
     if findings:
         raise MechanismError(findings)
-    span = sizes["span" if sensor.span else "range"] if sensor.bits else math.inf
-    return SensorChannel(
-        name, column, sensor.measures, unit, reading, 1 / scale.factor, sizes["range"], sizes["noise"],
-        2 * span / 2**sensor.bits if sensor.bits else 0.0, span, float(sensor.accuracy.gain.evaluate()),
-        sizes["accuracy.zero"], sizes["offset"], sizes["drift"],
-        sensor.bandwidth.value if sensor.bandwidth else None, sensor.per_turn or 0, sensor,
-    )  # fmt: skip
+    return SensorChannel(name, sensor, column, unit, reading, 1 / scale.factor, *sizes.values())
 
 
 def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
@@ -164,10 +162,8 @@ def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
 # ---- readings -------------------------------------------------------------------------------------------------
 
 
-def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
+def smoothed(true: Array, bandwidth: float, rate: float) -> Array:
     """A first-order low-pass of this bandwidth, Hz, exact for what runs straight between samples; at rest before."""
-    if bandwidth is None:
-        return true
     from scipy.signal import lfilter  # brings scipy.stats: longer to import than all the rest
 
     step = 2 * np.pi * bandwidth / rate  # h/τ
@@ -200,11 +196,15 @@ def readings(
 ) -> Array:
     """What a sensor makes of a true course, in the unit of its readings.
 
-    true: in SI at the samples, the idle stretches included; running: those in which the machine runs; noise: standard
+    true: in SI at the samples, the idle stretch included; running: those in which the machine runs; noise: standard
     normal numbers, None without.
     """
-    value = pulsed(true, running, channel.per_turn, rate) if channel.per_turn else true
-    value = smoothed(value, channel.bandwidth, rate) * (1 + drawn.gain) + drawn.offset
+    sensor, value = channel.sensor, true
+    if sensor.per_turn:
+        value = pulsed(value, running, sensor.per_turn, rate)
+    if sensor.bandwidth:
+        value = smoothed(value, sensor.bandwidth.value, rate)
+    value = value * (1 + drawn.gain) + drawn.offset
     value[running] += drawn.zero
     if channel.drift:
         value += channel.drift / rate * np.arange(len(value))
@@ -215,19 +215,18 @@ def readings(
 
 def converted(channel: SensorChannel, value: Array) -> Array:
     """Clipped, in steps, in the unit of the reading, with the decimals that a file has."""
-    value = np.clip(value, -channel.range, channel.range)
-    if channel.step:
+    value, step = np.clip(value, -channel.range, channel.range), channel.step
+    if step:  # the upper end of a converter is one step short
         sense = math.copysign(1.0, channel.per)
-        most = channel.span - channel.step  # the upper end of a converter is one step short
-        value = sense * np.clip(np.rint(sense * value / channel.step) * channel.step, -channel.span, most)
+        value = sense * np.clip(np.rint(sense * value / step) * step, -channel.span, channel.span - step)
     return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
 
 
-def pulses(angle: Array, per_turn: int, zero: float) -> tuple[NDArray[np.int64], Array]:
+def pulses(angle: Array, per_turn: int) -> tuple[NDArray[np.int64], Array]:
     """Running count of an encoder at the coordinates (rad) of the driver, and the part of the pulse that has passed.
 
     Its level is high in the first half of each pulse, its index for the first pulse of each turn.
     """
-    passed = (angle - zero) * (per_turn / (2 * np.pi)) + 1e-9
+    passed = angle * (per_turn / (2 * np.pi)) + 1e-9
     count = np.floor(passed)
     return count.astype(np.int64), np.asarray(passed - count)

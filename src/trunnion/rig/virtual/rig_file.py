@@ -7,59 +7,46 @@ quantity has a unit, every finding has its line.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, Tag, ValidationError
+from pydantic import Field, ValidationError
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.entry import Name, Part, forms
+from trunnion.model.entry import Name, Part
 from trunnion.model.expression import LITERAL
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.units import normalise
-from trunnion.rig.reading.mapping import Accuracies, FixedAngle, FixedTime, Pulses
-from trunnion.rig.reading.units import Frequency, Number, Positive, Size
+from trunnion.rig.reading import units
+from trunnion.rig.reading.mapping import Accuracies, Pulses
 
-__all__ = ["FORMATS", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
+__all__ = ["FORMATS", "Encoder", "Rig", "Schedule", "Sensor", "Value", "placed_in_rig"]
 
 FORMATS = ("csv", "parquet", "tdms")
 MOST_CONDITIONS = 10_000
 MOST_VALUES = 1000
+LONGEST = 1e6  # s at rest
 Value = float | str
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
-class Idle(Part):
-    """How long the machine stands unloaded before it runs, and after: there sensors of forces read their zero."""
-
-    before: FixedTime = Field(default="0 s", validate_default=True)
-    after: FixedTime = Field(default="0 s", validate_default=True)
-
-
 class Schedule(Part):
-    """The working conditions: a grid, or rows; how many cycles of each are recorded."""
+    """The working conditions: a grid, or rows; how many cycles of each are recorded; how long the machine stands
+    unloaded before it runs, where sensors of forces read their zero."""
 
     over: Mapping[str, str | Annotated[tuple[Value, ...], Field(min_length=1)]] = {}
     conditions: tuple[Mapping[str, Value], ...] = ()
     turns: Count = 10
-    idle: Annotated[
-        Annotated[FixedTime, Tag(":value")] | Annotated[Idle, Tag(":group")],
-        forms("a time, or a group {before: 0.5 s, after: 0.5 s}"),
-    ] = Field(default="0 s", validate_default=True)
-
-    @property
-    def pauses(self) -> Idle:
-        """The idle times before and after."""
-        return self.idle if isinstance(self.idle, Idle) else Idle(before=self.idle)
+    idle: units.Time = units.ZERO
 
     def rows(self) -> list[dict[str, Value]]:
         """What is set in each condition; of a grid the last name runs fastest. MechanismError for what is no range."""
         rows: list[dict[str, Value]] = [{}]
         for name, entry in self.over.items():
-            values = _spread(entry, f"schedule.over.{name}")
+            values = _spread(entry, f"schedule.over.{name}") if isinstance(entry, str) else list(entry)
             if len(rows) * len(values) > MOST_CONDITIONS:
                 what = f"the grid has more than {MOST_CONDITIONS:,} conditions"
                 raise MechanismError(Finding(what, "schedule.over", "use fewer values"))
@@ -73,7 +60,6 @@ class Encoder(Part):
     per_turn: Pulses
     kind: Literal["count", "level"] = "count"
     column: Name = "encoder"
-    zero: FixedAngle = Field(default="0 deg", validate_default=True)
     index: Name | None = None
 
 
@@ -90,23 +76,16 @@ class Sensor(Part):
     measures: str
     unit: str | None = None
     column: Name | None = None
-    range: Positive | None = None
-    sensitivity: Number | None = None
-    noise: Size = Field(default=0, validate_default=True)
+    range: units.Positive | None = None
+    sensitivity: units.Number | None = None
+    noise: units.Size = units.ZERO
     bits: Annotated[int, Field(ge=1, le=48)] | None = None
-    span: Positive | None = None
+    span: units.Positive | None = None
     accuracy: Accuracies = Accuracies()
-    offset: Size = Field(default=0, validate_default=True)
-    drift: Number = Field(default=0, validate_default=True)
-    bandwidth: Frequency | None = None
+    offset: units.Size = units.ZERO
+    drift: units.Number = units.ZERO
+    bandwidth: units.Frequency | None = None
     per_turn: Pulses | None = None
-
-
-class TimeColumn(Part):
-    """The column of the time, and its unit."""
-
-    column: Name = "t"
-    unit: Literal["s", "ms", "us"] = "s"
 
 
 class Rig(Part):
@@ -120,8 +99,7 @@ class Rig(Part):
     notes: str = ""
     set_: Mapping[str, Value] = Field(default={}, alias="set")
     schedule: Schedule = Schedule()
-    rate: Frequency
-    time: TimeColumn = TimeColumn()
+    rate: units.Frequency
     encoder: Encoder | None = None
     sensors: Annotated[Mapping[Name, Sensor], Field(min_length=1)]
     format: Literal["csv", "parquet", "tdms"] = "csv"
@@ -173,36 +151,33 @@ def placed_in_rig(findings: Iterable[Finding], path: Path) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _spread(entry: str | Sequence[Value], where: str) -> list[Value]:
-    """The values of a list, or of a text FROM:TO:COUNT, whose values are in the unit of its ends."""
-    if not isinstance(entry, str):
-        return list(entry)
+def _spread(entry: str, where: str) -> list[Value]:
+    """The values of FROM:TO:COUNT, in the unit of its ends; of another text itself."""
     parts = [part.strip() for part in entry.split(":")]
     if len(parts) == 1:
         return [entry]
-    ends = [LITERAL.fullmatch(normalise(part).strip().removeprefix("-").strip()) for part in parts[:2]]
-    units = [(end["unit"] or end["per"] or "") if end else "" for end in ends]
-    signs = [-1 if normalise(part).strip().startswith("-") else 1 for part in parts]
-    numbers = [sign * Fraction(end["number"]) for end, sign in zip(ends, signs, strict=False) if end]
+    ends = [LITERAL.fullmatch(normalise(part).removeprefix("-").strip()) for part in parts[:2]]
+    unit = [(end["unit"] or end["per"] or "") if end else "" for end in ends]
+    numbers = [
+        (-1 if normalise(part).startswith("-") else 1) * Fraction(end["number"])
+        for part, end in zip(parts, ends, strict=False) if end
+    ]  # fmt: skip
     count = int(parts[2]) if len(parts) == 3 and parts[2].isdigit() else 0
-    if not 2 <= count <= MOST_VALUES or len(numbers) < 2 or (units[0] != units[1] and all(numbers)):
+    if not 2 <= count <= MOST_VALUES or len(numbers) < 2 or (unit[0] != unit[1] and all(numbers)):
         remedy = "write FROM:TO:COUNT with the same unit at both ends, such as 0 deg:30 deg:7, or a list"
         raise MechanismError(Finding(f"'{entry}' is no range", where, remedy))
     (low, high), last = numbers, count - 1
-    unit = units[0] or units[1]
     values = [float((low * (last - k) + high * k) / last) for k in range(count)]
-    return [f"{value:.12g} {unit}" if unit else value for value in values]
+    return [f"{value:.12g} {unit[0] or unit[1]}" if any(unit) else value for value in values]
 
 
 def _unsound(rig: Rig) -> Iterable[Finding]:
     """What cannot be, whatever the mechanism."""
     if rig.schedule.over and rig.schedule.conditions:
         yield Finding("has a grid and rows", "schedule", "state `over` or `conditions`, not both")
-    pauses = rig.schedule.pauses
-    for key, quantity in (("before", pauses.before), ("after", pauses.after)):
-        if not 0 <= float(quantity.evaluate()) < 1e6:
-            yield Finding(f"the time {quantity.source} is out of range", f"schedule.idle.{key}", "write 0.5 s")
-    columns = [("time", rig.time.column), *((f"sensors.{name}", rig.column(name)) for name in rig.sensors)]
+    if not 0 <= rig.schedule.idle.value < LONGEST:
+        yield Finding(f"the time {rig.schedule.idle.source} is out of range", "schedule.idle", "write 0.5 s")
+    columns = [("time", "t"), *((f"sensors.{name}", rig.column(name)) for name in rig.sensors)]
     if rig.encoder:
         columns += [("encoder", rig.encoder.column), ("encoder.index", rig.encoder.index or "")]
     first: dict[str, str] = {}
@@ -210,13 +185,12 @@ def _unsound(rig: Rig) -> Iterable[Finding]:
         if column and first.setdefault(column, where) != where:
             yield Finding(f"the column '{column}' is that of {first[column]} too", where, "state another `column`")
     for name, sensor in rig.sensors.items():
+        where = f"sensors.{name}"
         if sensor.bits and not (sensor.span or sensor.range):
-            remedy = "state what they are spread over: span: 10 V"
-            yield Finding("has bits and neither span nor range", f"sensors.{name}.bits", remedy)
+            yield Finding("has bits and neither span nor range", f"{where}.bits", "state span: 10 V")
         if sensor.span and not sensor.bits:
-            yield Finding("is a span without bits", f"sensors.{name}.span", "state bits: 16")
+            yield Finding("is a span without bits", f"{where}.span", "state bits: 16")
         if sensor.sensitivity and sensor.sensitivity.value == 0:
-            yield Finding("is zero", f"sensors.{name}.sensitivity", "state reading per quantity: 100 mV/(N m)")
+            yield Finding("is zero", f"{where}.sensitivity", "state reading per quantity: 100 mV/(N m)")
         if sensor.per_turn and not sensor.measures.startswith("rate:"):
-            remedy = "measure rate:JOINT, or remove per_turn"
-            yield Finding("pulses measure a speed only", f"sensors.{name}.per_turn", remedy)
+            yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")

@@ -6,6 +6,7 @@ What is recorded of a row of modules is too long to be compiled as one function.
 
 from __future__ import annotations
 
+import sys
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -24,6 +25,10 @@ __all__ = ["Parts"]
 Array = NDArray[np.float64]
 MOST_KINDS = 512  # of parts whose code is kept at hand
 
+MOST_KEPT = 2**24  # numbers of a table whose memory is used again
+ALONE = 2  # references of what nothing else refers to: its name, and that of `getrefcount`
+
+_kept: list[Array] = []
 _codes: dict[tuple[Any, ...], MachineCode] = {}
 _compiling = Lock()
 
@@ -89,7 +94,7 @@ class Parts:
         last: the row with which the computation may end.
         """
         lanes = max(positions, vector_width())
-        table = np.empty((len(self.rows), lanes))
+        table = _memory(len(self.rows) * lanes).reshape(len(self.rows), lanes)
         alike = [number if isinstance(number, (float, int)) else number[0] for number in given]
         table[: len(given)] = np.array(alike)[:, None]
         for row, number in zip(table, given, strict=False):
@@ -101,6 +106,20 @@ class Parts:
         pointers = (array.ctypes.data for array in (self._functions, inputs, outputs))
         _row().function(0, calls, lanes, 0, 0, *pointers, None, None, None)
         return table
+
+
+def _memory(count: int) -> Array:
+    """Memory of so many numbers: that of a table which nothing uses any more, for new pages take as long as to compute.
+
+    What is a view of a table refers to its memory, so it is free once the list alone does.
+    """
+    if count > MOST_KEPT:
+        return np.empty(count)
+    kept = _kept.pop() if _kept else np.empty(0)
+    if kept.size < count or sys.getrefcount(kept) > ALONE:
+        kept = np.empty(count)
+    _kept.append(kept)
+    return kept[:count]
 
 
 @cache

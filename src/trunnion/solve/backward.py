@@ -169,7 +169,7 @@ def solve(
 def backward(walk: Forward, method: FrictionMethod, conditions: Given) -> Backward:
     """Reactions and friction of every module of a walk, in its direction."""
     if walk.direction < 0 and walk.assembly:
-        coded = _by_code(walk.system, walk.values, walk.assembly, walk.time, method, conditions, turned=True)
+        coded = _by_code(walk.system, walk.values, walk.assembly, walk.time, method, conditions, walk.direction)
         if coded is not None:
             return coded
     return by_numpy(walk, method, conditions)
@@ -182,9 +182,9 @@ def _by_code(
     time: Number,
     method: FrictionMethod,
     conditions: Given,
-    turned: bool = False,
+    direction: float = 1.0,
 ) -> Backward | None:
-    """The same by machine code, of a long row; None where that is for NumPy. turned: passed the other way."""
+    """The same by machine code, of a long row; None where that is for NumPy."""
     usual = method.name == "newton" and method.limit == FrictionMethod.limit
     if (
         np.ndim(time) != 1
@@ -193,26 +193,26 @@ def _by_code(
         or not (usual and method.criterion is None and method.multiple is None)
     ):
         return None
-    code = row_code(system, values, assembly, turned)
-    back: Backward | None = None if code is None else code.solved(system, values, np.asarray(time, float))
+    code = row_code(system, values, assembly)
+    back: Backward | None = None if code is None else code.solved(system, values, np.asarray(time, float), direction)
     if back is not None:
         back.margin_up_to = method.margin_up_to
     return back
 
 
-def row_code(system: System, values: Values, assembly: Assembly, turned: bool = False) -> RowCode | None:
+def row_code(system: System, values: Values, assembly: Assembly) -> RowCode | None:
     """Machine code that solves a long row, see `row_code.code_of`; None of few modules."""
     if len(system.plan.modules) < MANY_MODULES:
         return None
     from trunnion.solve.row_code import code_of  # LLVM is loaded for long rows alone
 
-    return code_of(system, values, assembly, turned, _passed)
+    return code_of(system, values, assembly, _passed)
 
 
 @np.errstate(all="ignore")
-def _passed(walk: Forward, turned: bool) -> Backward:
+def _passed(walk: Forward, direction: Number) -> Backward:
     """What machine code does after a walk, and NumPy at positions which that does not decide."""
-    return by_numpy(walk.backward() if turned else walk, FrictionMethod(), Given())
+    return by_numpy(walk.backward(direction), FrictionMethod(), Given())
 
 
 def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backward:

@@ -192,12 +192,16 @@ class Forward:
 
     # ---- the walk ---------------------------------------------------------------------------------------------
 
-    def backward(self) -> Forward:
-        """The same positions passed the other way: velocities turned round, accelerations as they are."""
-        turned = {
-            link: motion._replace(twist=self.algebra.times(-1.0, motion.twist)) for link, motion in self.motions.items()
-        }
-        return replace(self, motions=turned, direction=-self.direction)
+    def backward(self, direction: Number = -1.0) -> Forward:
+        """The same positions passed the other way: velocities turned round, accelerations as they are.
+
+        direction: by which they are multiplied; 1 is the way it is.
+        """
+        turned = {}
+        for link, motion in self.motions.items():
+            turned[link] = motion._replace(twist=self.algebra.times(direction, motion.twist))
+            cut(self.time)
+        return replace(self, motions=turned, direction=direction * self.direction)
 
     def rate(self, driver: str) -> Number:
         """Rate of a driver, rad/s or m/s."""

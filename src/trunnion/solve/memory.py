@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Looked = tuple[Array, NDArray[np.integer]]
 
 CHUNK = 8192  # solved at a time: the arrays of a walk stay in cache
-JOINTS = 2**19  # at all the positions that are solved at a time: each takes some 300 bytes
+JOINTS = 2**18  # at all the positions that are solved at a time: each takes some 300 bytes
 BLOCK = 30 * 2**20  # bytes; glibc learns from blocks of up to 32 MiB
 
 

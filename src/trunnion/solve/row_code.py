@@ -31,12 +31,12 @@ from trunnion.solve.system import System, Values
 __all__ = ["RowCode", "code_of", "leaves_of"]
 
 Array = NDArray[np.float64]
-Pass = Callable[[Forward, bool], Any]  # gives a `Backward`
-Codes = dict[bool, "RowCode | None"]  # by whether positions are passed the other way
+Pass = Callable[[Forward, Number], Any]  # gives a `Backward` of a walk in a direction, 1 or −1
 
 MOST_CODES = 8  # of a system: numbers that are 0 or 1 are compiled in, and to record each choice of them takes seconds
 LATEST = "latest"  # among the codes of a system: the numbers that were asked for last, and what of them is compiled in
 MOST_FORMS = 16  # of mechanisms whose code is kept at hand
+DIRECTION = "direction"  # among the inputs of a code
 TRIED = np.array([0.0, 0.0137, 0.137, 1.37])  # s, at which code that was recorded of another mechanism is tried
 NUMBER = re.compile(r"[-+]?\.?\d[\d.]*([eE][-+]?\d+)?( [^-+*/^()]*)?$")  # with its unit, but no expression
 POINT = re.compile(r"links\.[^.]*\.(points\.[^.]*|centre)\.[xyz]$")
@@ -48,18 +48,16 @@ EAGER = ("body_power", "gear_power")  # what has a default is not made when it i
 STATED = ("walk", "travels", "margin_up_to", "margin")  # of a `Backward`, by whoever asks
 
 
-_recorded: dict[Hashable, Codes] = {}
+_recorded: dict[Hashable, RowCode] = {}
 
 
-def code_of(system: System, values: Values, assembly: Assembly, turned: bool, passed: Pass) -> RowCode | None:
+def code_of(system: System, values: Values, assembly: Assembly, passed: Pass) -> RowCode | None:
     """The machine code for such numbers, recorded when it is first asked for; None where there is none.
 
     Parameters
     ----------
-    turned
-        Whether positions are passed the other way.
     passed
-        What is to be compiled: it goes back over a walk, turned or not.
+        What is to be compiled: it goes back over a walk that is passed in a direction.
     """
     of_values, literal = system.codes.get(LATEST, (None, None))
     if of_values is not values:  # of the same numbers more than one thing is asked
@@ -71,28 +69,24 @@ def code_of(system: System, values: Values, assembly: Assembly, turned: bool, pa
     if key not in system.codes:
         if len(system.codes) > MOST_CODES:
             return None
-        system.codes[key] = _alike((_form(system), *key), system, values, assembly, passed)
-    codes: Codes = system.codes[key]
-    if turned not in codes:
-        codes[turned] = None
+        system.codes[key] = None
         with suppress(UntraceableError):
-            codes[turned] = RowCode(system, values, assembly, turned, passed)
-    return codes[turned]
+            system.codes[key] = _of_form((_form(system), *key), system, values, assembly, passed)
+    code: RowCode | None = system.codes[key]
+    return code
 
 
-def _alike(form: Hashable, system: System, values: Values, assembly: Assembly, passed: Pass) -> Codes:
-    """The codes of another mechanism that differs by numbers alone, if they solve this one too; else none yet."""
-    codes = _recorded.get(form, {})
-    for turned, code in codes.items():
-        right = passed(forward(system, values, assembly, TRIED), turned)
-        back = None if code is None else code.solved(system, values, TRIED)
-        if back is None or _same((back.reactions, back.walk.motions), (right.reactions, right.walk.motions)):
-            return codes
-        break
+def _of_form(form: Hashable, system: System, values: Values, assembly: Assembly, passed: Pass) -> RowCode:
+    """The code of another mechanism that differs by numbers alone, if it solves this one too; else one that is new."""
+    code = _recorded.get(form)
+    if code is not None:
+        back, right = code.solved(system, values, TRIED), passed(forward(system, values, assembly, TRIED), 1.0)
+        if back is not None and _same((back.reactions, back.walk.motions), (right.reactions, right.walk.motions)):
+            return code
     if len(_recorded) >= MOST_FORMS:
         _recorded.clear()
-    codes = _recorded[form] = {}
-    return codes
+    code = _recorded[form] = RowCode(system, values, assembly, passed)
+    return code
 
 
 def _structure(values: Values) -> tuple[tuple[str, Any], ...] | None:
@@ -129,22 +123,23 @@ def _form(system: System) -> str:
 
 
 class RowCode:
-    """Machine code of `backward.solve` for a system, or of the same passed the other way.
+    """Machine code of `backward.solve` for a system, its positions passed in either direction.
 
     Raises UntraceableError where the mechanism has what only NumPy does.
     """
 
-    def __init__(self, system: System, values: Values, assembly: Assembly, turned: bool, passed: Pass) -> None:
-        self.assembly, self.turned, self.passed = assembly, turned, passed
+    def __init__(self, system: System, values: Values, assembly: Assembly, passed: Pass) -> None:
+        self.assembly, self.passed = assembly, passed
         graph, literal = Graph(in_parts=True), dict(_structure(values) or ())
         numbers = {path: Recorded(graph, graph.input(path, BOTH)) for path in values if path not in literal}
-        time, conditions = Recorded(graph, graph.input(TIME, BOTH)), list[Number]()
+        time, direction = (Recorded(graph, graph.input(name, BOTH)) for name in (TIME, DIRECTION))
+        conditions = list[Number]()
         with np.errstate(all="ignore"):
             walk = forward(system, {**literal, **numbers}, assembly, time)
             for group, pose in zip(system.groups, walk.poses, strict=True):
                 conditions.append(group.condition(pose))
                 graph.cut()
-            back = passed(walk, turned)
+            back = passed(walk, direction)
         self._kind: Any = type("Solved", (_Filled, type(back)), {})
         self._of_back = [entry.name for entry in fields(back) if entry.name not in STATED]
         nests = {name: getattr(back.walk, name) for name in OF_WALK}
@@ -178,9 +173,9 @@ class RowCode:
         moved = [row for row in self._nests["motions"].leaves if row in in_table]
         self._last = max([*moved, *self._conditions, *self._doubts], default=0)
 
-    def solved(self, system: System, values: Values, time: Array) -> Any:
+    def solved(self, system: System, values: Values, time: Array, direction: float = 1.0) -> Any:
         """Motion and forces at some times, s, a `Backward`; None where NumPy is to find all of them."""
-        table = self._table(values, time)
+        table = self._table(values, time, direction)
         condition = np.max(table[self._conditions], axis=0, initial=1.0)
         doubtful = ~(condition <= BORDER) | np.any(table[self._certain] == 0.0, axis=0)
         doubtful |= ~np.isfinite(np.sum(table[self._forces], axis=0)) | np.any(table[self._doubts] != 0.0, axis=0)
@@ -191,14 +186,14 @@ class RowCode:
             return None
         entries = _Entries(self._nests, table, self._truths, self._same)
         bound = np.max(table[self._bound], axis=0, initial=0.0)
-        walk = self._walked(system, values, time, entries)
+        walk = self._walked(system, values, time, entries, direction)
         filled = self._kind.__new__(self._kind)
         filled.__dict__ |= {"_entries": entries, "walk": walk, "travels": False, "margin": None}
         both: list[tuple[Any, Any]] = [(walk, {"condition": condition, "assembled": assembled}), (filled, {})]
         both[1][1].update(converged=~doubtful, share=np.where(doubtful, 0.0, 1.0), bound=bound)
         if doubtful.any():
             lanes = np.flatnonzero(doubtful)
-            back = self.passed(forward(system, values, self.assembly, time[lanes]), self.turned)
+            back = self.passed(forward(system, values, self.assembly, time[lanes]), direction)
             for name in (*OF_WALK, *self._of_back):
                 if not entries.put(name, getattr(back.walk if name in OF_WALK else back, name), lanes):
                     return None
@@ -213,21 +208,22 @@ class RowCode:
 
     def walked(self, system: System, values: Values, time: Array) -> Forward:
         """Motion alone at some times, s, NaN where it cannot be assembled."""
-        table = self._table(values, time, self._last)
-        walk = self._walked(system, values, time, _Entries(self._nests, table, self._truths, self._same))
+        table = self._table(values, time, 1.0, self._last)
+        walk = self._walked(system, values, time, _Entries(self._nests, table, self._truths, self._same), 1.0)
         walk.condition = np.max(table[self._conditions], axis=0, initial=1.0)
         walk.assembled = np.isfinite(np.sum(table[self._frames], axis=0))
         return walk
 
-    def _walked(self, system: System, values: Values, time: Array, entries: _Entries) -> Forward:
+    def _walked(self, system: System, values: Values, time: Array, entries: _Entries, direction: float) -> Forward:
         made = _WalkedInSpace if system.spatial else _Walked
         walk = made.__new__(made)
         walk.__dict__ |= {"_entries": entries, "system": system, "values": values, "time": time}
-        walk.direction, walk.assembly = -1.0 if self.turned else 1.0, list(self.assembly)
+        walk.direction, walk.assembly = direction, list(self.assembly)
         return walk
 
-    def _table(self, values: Values, time: Array, last: int | None = None) -> Array:
-        given = [time if path == TIME else values[path] for path in self._parts.inputs]
+    def _table(self, values: Values, time: Array, direction: float, last: int | None = None) -> Array:
+        given = [time if path == TIME else direction if path == DIRECTION else values[path]
+                 for path in self._parts.inputs]  # fmt: skip
         return self._parts.run(given, len(time), last)[:, : len(time)]
 
 

@@ -132,6 +132,7 @@ def _example(question: Asked) -> dict[str, Any]:
 # ---- a model ------------------------------------------------------------------------------------------------------
 
 
+@uncollected()
 def _model(question: Asked) -> dict[str, Any]:
     """Findings, numbers, motion and forces of a text; the figures of its cycle are asked for by `cycle`."""
     state = question.state
@@ -170,6 +171,7 @@ def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     return Sketch(entries, places or {}, fine=float(question.get("fine") or 0.0))
 
 
+@uncollected()
 def _cycle(question: Asked) -> dict[str, Any]:
     """Findings and figures of the whole cycle of a text, which take longer than its motion."""
     result, answer_so_far = _solved(question, lambda: question.result)

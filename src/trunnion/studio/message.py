@@ -61,7 +61,7 @@ def packed(header: Mapping[str, Any]) -> bytes:
             places.append({"bytes": [0, len(value)]})
             return places[-1]
         if isinstance(value, (list, tuple)):
-            if len(value) >= SHORTEST and all(item is None or type(item) in (int, float) for item in value):
+            if len(value) >= SHORTEST and set(map(type, value)) <= {int, float, type(None)}:
                 return column(np.array(value, float))
             return [plain(item) for item in value]
         if isinstance(value, float) and not np.isfinite(value):

@@ -75,13 +75,14 @@ async function answered() {
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
+  const coming = found.solved ? figures(asked) : null; // Python works at them while the mechanism is drawn
   const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
-  const { numbers = {}, figures = [] } = state.answer.value ?? {};
-  state.answer.value = { ...found, numbers: read ? found.numbers : numbers, figures, coming: found.solved, text: sent, friction: asked.friction };
+  const before = state.answer.value ?? { numbers: {}, figures: [] };
+  state.answer.value = { ...found, numbers: read ? found.numbers : before.numbers, figures: before.figures ?? [], coming: found.solved, text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
   if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
-  if (found.solved) await (cycles = cycles.then(() => figured(asked)));
+  await coming;
 }
 
 /** Links and joints at their start, drawn while the first answer is awaited. */
@@ -92,17 +93,16 @@ async function outlined(asked) {
   state.answer.value = { ...found, outline: true, solved: false, scene: null, findings: [], missing: [], ready: [], text: asked.text, friction: asked.friction };
 }
 
-let cycles = Promise.resolve(); // one after another, for a long one would hold up the next
-
-/** Findings and figures of the whole cycle of the present text. */
-async function figured(asked) {
-  const present = () => state.answer.value?.text === asked.text && state.text.value === asked.text && state.answer.value.friction === asked.friction;
-  if (!present()) return;
-  const found = await link.ask("cycle", asked);
-  if (!found || !present()) return;
-  if (found.error) state.say(found.error, true);
-  state.answer.value = { ...state.answer.value, ...(found.error ? {} : found), coming: false };
-}
+/** Ask for findings and figures of the whole cycle; one question at a time, for a long one would hold up the next. */
+const figures = newest(
+  (asked) => (asked.text === state.text.value ? link.ask("cycle", asked) : Promise.resolve(null)),
+  (found, asked) => {
+    const { text, friction } = state.answer.value ?? {};
+    if (text !== asked.text || state.text.value !== asked.text || friction !== asked.friction) return;
+    if (found.error) state.say(found.error, true);
+    state.answer.value = { ...state.answer.value, ...(found.error ? {} : found), coming: false };
+  },
+);
 
 let typing = 0;
 
@@ -184,7 +184,6 @@ export function newest(ask, show) {
       const asked = wanted;
       wanted = null;
       const coming = ask(asked);
-      await null; // it is sent
       last();
       const answer = await coming;
       last = () => answer && show(answer, asked);

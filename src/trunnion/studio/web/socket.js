@@ -134,7 +134,9 @@ export function connection(/** @type {(open: boolean) => void} */ onState) {
       const revision = (revisions[kind] = (revisions[kind] ?? 0) + 1);
       finish(kind, null);
       const answer = new Promise((resolve) => (waiting[kind] = { revision, resolve }));
-      ready.then(() => waiting[kind]?.revision === revision && send(JSON.stringify({ ask: kind, revision, ...fields })));
+      const question = JSON.stringify({ ask: kind, revision, ...fields });
+      if (socket?.readyState === WebSocket.OPEN) send(question); // at once: what is drawn next may take a while
+      else ready.then(() => waiting[kind]?.revision === revision && send(question));
       return answer; // a connection that is lost answers with null, though it may never have been there
     },
   };

@@ -375,7 +375,8 @@ def cells(back: Backward, read: Container[str]) -> Iterator[Cell]:
 
     read: the variables that somebody reads; others may be left out.
     """
-    yield from _motion(back.walk)
+    if any(name in read for name in (*POSES, *RATES)):
+        yield from _motion(back.walk)
     yield from _forces(back, read)
     yield from _powers(back)
     yield from _solution(back)

@@ -169,6 +169,8 @@ def _bearing(cycle: Cycle, course: CycleCourse, i: int, joint: str) -> Iterator[
         return np.asarray(np.max([magnitude(rows[k : k + axes]) for k in range(0, len(rows), axes)], axis=0))
 
     ends = bearing_ends(mechanism, joint)
+    if not ends and not has_pressure(mechanism, joint):
+        return
     top = course.extreme("end_load" if ends else "reaction_force", i, of=larger, unit="N")
     if top is not None and ends:
         yield course.figure(f"{joint}.end_load_max", f"load on an end of {joint}", top, "N", "maximum")

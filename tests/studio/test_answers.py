@@ -95,13 +95,6 @@ def test_pictures_of_examples():
     assert "no example" in ask(ask="picture", name="none")["error"]
 
 
-def test_the_outline_is_what_the_answer_draws_at_the_start():
-    outline, found = (ask(ask=kind, text=EXAMPLES[FOURBAR]) for kind in ("outline", "model"))
-    assert (outline["entries"], outline["numbers"]) == (found["entries"], found["numbers"])
-    for key, place in found["places"].items():
-        assert outline["places"][key] == pytest.approx(place, abs=1e-6)
-
-
 def test_a_drag_that_changes_nothing_says_so():
     text = EXAMPLES["scotch-yoke"]
     places = ask(ask="model", text=text)["places"]

@@ -27,8 +27,8 @@ from trunnion.model.file import text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of
+from trunnion.results.dataset import Column
 from trunnion.results.scales import without_noise
-from trunnion.results.tables import selected
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.run import prepare
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
@@ -46,7 +46,7 @@ from trunnion.studio.findings import (
 )  # fmt: skip
 from trunnion.studio.layers import centres_of, corner_of, measured, seats_of, transmission_of
 from trunnion.studio.live import Live, live_in_space, places_at, uncollected
-from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
+from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded, columns_of
 from trunnion.studio.message import packed
 from trunnion.studio.placed import plain, thumbnail, tracks
 from trunnion.studio.selected_links import group
@@ -136,7 +136,7 @@ def _example(question: Asked) -> dict[str, Any]:
 def _model(question: Asked) -> dict[str, Any]:
     """Findings, numbers, motion and forces of a text; the figures of its cycle are asked for by `cycle`."""
     state = question.state
-    result, answer_so_far = _solved(question, lambda: question.motion)
+    result, answer_so_far = _solved(question, lambda: question.cycle.motion)
     numbers: Mapping[str, Any] = {}
     with suppress(MechanismError):  # of what is half drawn those that can be read
         numbers = state.mechanism.parameters() if state.mechanism else _sketch(question).numbers
@@ -159,12 +159,6 @@ def _model(question: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _outline(question: Asked) -> dict[str, Any]:
-    """What can be drawn of a text in the plane before its answer is there: its points at the shown position."""
-    state = question.state
-    return {"entries": state.entries, "numbers": plain(state.run.values), "places": places_at(question)}
-
-
 def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
     entries = copy.deepcopy(dict(question.state.entries or {}))
@@ -174,7 +168,7 @@ def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
 @uncollected()
 def _cycle(question: Asked) -> dict[str, Any]:
     """Findings and figures of the whole cycle of a text, which take longer than its motion."""
-    result, answer_so_far = _solved(question, lambda: question.result)
+    result, answer_so_far = _solved(question, lambda: question.cycle.result)
     if result is None:
         return answer_so_far
     rows = [[figure["label"], figure["text"]] for figure in figures(question)]
@@ -232,17 +226,16 @@ def _drag(question: Asked) -> dict[str, Any]:
     """
     if question.get("by") is not None:
         sketch, by = _sketch(question), [float(part) for part in question["by"]]
-        sketch.numbers = question.run.system.mechanism.parameter_set.nominal
+        sketch.numbers = question.state.run.system.mechanism.parameter_set.nominal
         shifts = sketch.shifted(str(question["point"]), by, _turns(question.state, question.index))
         return _live(question, {change.path: change.value for change in shifts}, question.index)
     index, to, point = question.index, vector(question["to"]), str(question["point"])
     fine = float(question.get("fine") or 0.0)
     sketch = _Still(dict(question.state.entries or {}), places_at(question), fine=fine)
-    if question.state.mechanism is not None:
-        sketch.numbers = question.state.mechanism.parameter_set.nominal
+    sketch.numbers = question.state.run.system.mechanism.parameter_set.nominal
     changes = {change.path: change for change in sketch.moved(point, to, bool(question.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
-    live = Live(question.run, values, question.steps)
+    live = Live(question.cycle.run, values, question.steps)
     near = live.nearest(*held(sketch, point), to, index, 1e-6 * sketch.size)
     rows = []
     for path, value in values.items():
@@ -263,9 +256,9 @@ def _live(question: Asked, values: Mapping[str, float], index: int, live: Live |
     """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
     run, locked = question.state.run, {}
     if run.system.spatial:
-        columns = live_in_space(question.run, values, question.steps, index)
+        columns = live_in_space(question.cycle.run, values, question.steps, index)
     else:
-        columns = (live or Live(question.run, values, question.steps)).told(index)
+        columns = (live or Live(question.cycle.run, values, question.steps)).told(index)
     at = index if len(columns["status"]) > 1 else 0
     status = np.array(columns["status"][at : at + 1])
     if status[0] == Status.LOCKED:
@@ -326,7 +319,7 @@ def _done(sketch: Sketch, request: Mapping[str, Any]) -> str:
 
 def _turns(state: Loaded, index: int) -> dict[str, Array]:
     """Rotation of every moving link in space, (3, 3), at a position of the cycle; MechanismError where it has none."""
-    poses = gathered(state.motion(STEPS, True)).poses
+    poses = gathered(state.cycle(STEPS, True).motion).poses
     turns = {link: pose.matrix[:, :, index % STEPS] for link, pose in poses.items()}
     if not all(np.isfinite(turn).all() for turn in turns.values()):
         what = "cannot be assembled at the position that is shown"
@@ -366,11 +359,11 @@ def _layers(question: Asked) -> dict[str, Any]:
     """What the sheet shows over the mechanism, of what is wanted: columns of the table by their names, and in the plane
     instant centres, transmission angles, pins in their holes.
     """
-    result, run, layers_wanted = question.motion, question.state.run, set(question.get("wanted") or ())
-    layers: dict[str, Any] = _columns(result, question)
+    cycle, run, layers_wanted = question.cycle, question.state.run, set(question.get("wanted") or ())
+    layers: dict[str, Any] = _columns(cycle.columns, question)
     if run.system.mechanism.space == "planar":
         if "seats" in layers_wanted:
-            layers["seats"] = seats_of(result)
+            layers["seats"] = seats_of(cycle.motion)
         if layers_wanted & {"centres", "transmission"}:
             with np.errstate(all="ignore"):
                 walk = run.walk(run.cycle.times(question.steps))
@@ -381,7 +374,7 @@ def _layers(question: Asked) -> dict[str, Any]:
 
 def _blocks(question: Asked) -> dict[str, Any]:
     """The mechanism as blocks wired by their pins, with what passes the wires at each position."""
-    return blocks_of(question.state.run.system, without_noise(question.motion))
+    return blocks_of(question.state.run.system, without_noise(question.cycle.motion))
 
 
 def _margins(question: Asked) -> dict[str, Any]:
@@ -394,13 +387,11 @@ def _margins(question: Asked) -> dict[str, Any]:
 
 def _curves(question: Asked) -> dict[str, Any]:
     """Names and units of all columns of the table of a cycle, and those that are wanted."""
-    return _columns(question.result, question)
+    return _columns(columns_of(question.cycle.result), question)
 
 
-def _columns(result: xr.Dataset, question: Asked) -> dict[str, Any]:
-    """Names and units of the columns of numbers of a result, and those of the `names` that are asked for, in SI."""
-    table = selected(without_noise(result), ["all"])
-    columns = {column.name: column for column in table if column.values.dtype.kind == "f"}
+def _columns(columns: Mapping[str, Column], question: Asked) -> dict[str, Any]:
+    """Names and units of columns, and those of the `names` that are asked for, in SI."""
     names = [str(name) for name in question.get("names") or () if str(name) in columns]
     return {
         "names": [[column.name, column.unit] for column in columns.values()],
@@ -416,13 +407,14 @@ def _compare(question: Asked) -> dict[str, Any]:
     for other in question["others"]:
         variant = Asked({**other, "steps": question.steps})
         try:
-            result = variant.result
+            result = variant.cycle.result
         except MechanismError as error:
             others.append({"scene": None, "why": f"cannot be solved: {sentence(error.findings[0])}", "figures": []})
             continue
         others.append({
             "scene": scene(result, max_positions=MOST_STEPS), "why": None, "figures": figures(variant),
-            "margin": margin_of(result, variant.rubs)["margin"], "columns": _columns(result, question)["columns"],
+            "margin": margin_of(result, variant.rubs)["margin"],
+            "columns": _columns(columns_of(result), question)["columns"],
         })  # fmt: skip
     return {"figures": figures(question), "others": others}
 
@@ -439,11 +431,11 @@ def _export(question: Asked) -> dict[str, Any]:
     if what not in FILES:
         raise MechanismError(Finding(f"'{what}' is no file of the studio", remedy=f"use {', '.join(FILES)}"))
     ending, mime = FILES[what]
-    result = state.result(steps, True)
+    result = state.cycle(steps, True).result
     if what == "csv":
         content = str(frame(result, units="model").to_csv(index=False, lineterminator="\n")).encode()
     elif what == "report":
-        content = report(result, state.result(steps, False)).encode()
+        content = report(result, state.cycle(steps, False).result).encode()
     else:
         stream = io.BytesIO()
         mechanism(result, index=question.index).savefig(stream, format=what)
@@ -454,12 +446,14 @@ def _export(question: Asked) -> dict[str, Any]:
 
 def _corner(question: Asked) -> dict[str, Any]:
     """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    return corner_of(question.run.system.mechanism, str(question["measure"]), question.get("side"), question.steps)
+    return corner_of(
+        question.cycle.run.system.mechanism, str(question["measure"]), question.get("side"), question.steps
+    )
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
-    "start": _start, "example": _example, "picture": _example, "outline": _outline, "model": _model, "cycle": _cycle,
+    "start": _start, "example": _example, "picture": _example, "model": _model, "cycle": _cycle,
     "drag": _drag, "try": _try, "edit": _edit, "export": _export, "assemblies": _assemblies, "layers": _layers,
     "blocks": _blocks, "margins": _margins, "curves": _curves, "compare": _compare, "corner": _corner,
 }  # fmt: skip
-BESIDE = (_outline, _drag, _try, _cycle, _margins, _corner)
+BESIDE = (_drag, _try, _cycle, _margins, _corner)

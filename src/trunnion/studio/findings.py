@@ -64,8 +64,8 @@ def figures(question: Asked) -> list[dict[str, Any]]:
         name: by which that of another model is found; label; title: without its place; text: with its unit; value: SI,
         None where there is none, or nothing but a bound.
     """
-    units = units_of(question.result)
-    figures = [row for row in summary_of(question.result) if not row.numerical]
+    units = units_of(question.cycle.result)
+    figures = [row for row in summary_of(question.cycle.result) if not row.numerical]
     figures = [row for row in figures if question.friction or not row.name.startswith("efficiency")]
     figures += [Figure(f"{name}.time_ratio", f"time ratio of {name}", ratio) for name, ratio in _ratios(question.state)]
     rows = []

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,8 @@ from trunnion.model.changes import with_law
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.text import stated_files
+from trunnion.results.scales import without_noise
+from trunnion.results.tables import selected
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import rubbing
 
@@ -23,20 +26,78 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.cycle.positions import Positions
+    from trunnion.results.dataset import Column
 
-__all__ = ["MOST_LINKS", "Asked", "Loaded", "loaded"]
+__all__ = ["MOST_LINKS", "Asked", "Cycle", "Loaded", "columns_of", "loaded"]
 
 MOST_SIGNS = 300_000  # of a text: what is longer takes seconds to read at every stroke of a key
 MOST_LINKS = 400  # that are solved while one draws
 STEPS, MOST_STEPS = 360, 3600
 
 
-@dataclass(frozen=True, eq=False)  # one for each text, by which its results are kept
+class Cycle:
+    """A mechanism over its cycle, worked out as far as it is asked for.
+
+    Parameters
+    ----------
+    run : the mechanism, prepared.
+    steps : positions of the cycle.
+    """
+
+    def __init__(self, run: Run, steps: int) -> None:
+        self.run, self.steps = run, steps
+        self._working_out = Lock()
+
+    @cached_property
+    def positions(self) -> Positions:
+        """Motion and forces at the positions; MechanismError where it has no cycle."""
+        from trunnion.cycle.positions import positions  # not for the first picture
+
+        if self.run.determinacy is not None:
+            self.run.determinacy.refuse()
+        with np.errstate(all="ignore"):
+            return positions(self.run, self.steps, averaged=False)
+
+    @cached_property
+    def motion(self) -> xr.Dataset:
+        """They as a result that has no figures of the cycle yet, which may take many times as long."""
+        from trunnion.cycle.summary import result_of
+
+        with np.errstate(all="ignore"):
+            return result_of(self.run, self.positions).dataset
+
+    @property
+    def result(self) -> xr.Dataset:
+        """What `analyse` gives, of the same positions; who asks while it is worked out waits for it."""
+        with self._working_out:
+            return self._result
+
+    @cached_property
+    def _result(self) -> xr.Dataset:
+        from trunnion.cycle.positions import over_cycle
+        from trunnion.cycle.summary import result_of
+
+        with np.errstate(all="ignore"):
+            return result_of(self.run, over_cycle(self.run, self.positions)).dataset
+
+    @cached_property
+    def columns(self) -> dict[str, Column]:
+        """The columns of numbers of the table of its motion, by name."""
+        return columns_of(self.motion)
+
+
+def columns_of(result: xr.Dataset) -> dict[str, Column]:
+    """The columns of numbers of the table of a result, by name."""
+    table = selected(without_noise(result), ["all"])
+    return {column.name: column for column in table if column.values.dtype.kind == "f"}
+
+
+@dataclass(frozen=True, eq=False)  # one for each text, by which its cycles are kept
 class Loaded:
     """entries: plain data, None of a text that cannot be read; mechanism: None where it is not sound.
 
-    findings: everything known before it is solved, with lines of the text; bare: whether the mechanism is that without
-    friction, for what is stated of that is not sound, as the findings tell.
+    findings: everything known before it is solved, with lines of the text. What is wrong with friction alone leaves the
+    mechanism without it.
     """
 
     text: str
@@ -44,58 +105,29 @@ class Loaded:
     lines: Lines
     mechanism: Mechanism | None
     findings: tuple[Finding, ...]
-    bare: bool = False
-    _working_out: Lock = field(default_factory=Lock, repr=False)
+
+    @property
+    def bare(self) -> bool:
+        """Whether the mechanism is one without friction, for what is stated of that is not sound."""
+        errors = (finding.severity is Severity.ERROR for finding in self.findings)
+        return self.mechanism is not None and any(errors)
 
     def placed(self, findings: tuple[Finding, ...]) -> list[Finding]:
         """Findings with their lines."""
         return place(findings, "", self.lines, self.entries or {})
 
-    @cached_property
+    @property
     def run(self) -> Run:
         """The mechanism prepared; MechanismError if its structure does not determine its motion."""
         if self.mechanism is None:
             raise MechanismError(self.findings)
         return prepare(self.mechanism)
 
-    @cached_property
-    def frictionless_run(self) -> Run:
-        """The same without friction."""
-        return prepare(self.run.system.mechanism.with_friction("off"))
-
-    @lru_cache(maxsize=2)  # noqa: B019  # a handful of texts is kept, see `loaded`
-    def positions(self, steps: int, friction: bool) -> Positions:
-        """Motion and forces with or without friction at the positions; MechanismError where it has no cycle."""
-        from trunnion.cycle.positions import positions  # not for the first picture
-
-        run = self.run if friction else self.frictionless_run
-        if run.determinacy is not None:
-            run.determinacy.refuse()
-        with np.errstate(all="ignore"):
-            return positions(run, steps, averaged=False)
-
-    @lru_cache(maxsize=2)  # noqa: B019
-    def motion(self, steps: int, friction: bool) -> xr.Dataset:
-        """The positions as a result that has no figures of the cycle yet, which may take many times as long."""
-        from trunnion.cycle.summary import result_of
-
-        positions = self.positions(steps, friction)
-        with np.errstate(all="ignore"):
-            return result_of(self.run if friction else self.frictionless_run, positions).dataset
-
-    def result(self, steps: int, friction: bool) -> xr.Dataset:
-        """What `analyse` gives, of the same positions; who asks while it is worked out waits for it."""
-        with self._working_out:
-            return self._result(steps, friction)
-
-    @lru_cache(maxsize=2)  # noqa: B019
-    def _result(self, steps: int, friction: bool) -> xr.Dataset:
-        from trunnion.cycle.positions import over_cycle
-        from trunnion.cycle.summary import result_of
-
-        positions, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
-        with np.errstate(all="ignore"):
-            return result_of(run, over_cycle(run, positions)).dataset
+    @lru_cache(maxsize=3)  # noqa: B019  # a handful of texts is kept, see `loaded`
+    def cycle(self, steps: int, friction: bool) -> Cycle:
+        """Its cycle with the friction that is stated, or with none."""
+        run = self.run
+        return Cycle(run if friction else prepare(run.system.mechanism.with_friction("off")), steps)
 
 
 _reading = Lock()  # a question that is asked meanwhile finds what was read for the one before
@@ -118,17 +150,16 @@ def _loaded(text: str) -> Loaded:
         return Loaded(text, None, {}, None, error.findings)
     if not entries:
         return Loaded(text, {}, {}, None, ())
-    mechanism, findings = None, version_findings(entries)
+    mechanism, findings = None, [*version_findings(entries), *_refusals(entries)]
     try:
-        findings += _refusals(entries)
         if not findings:
             mechanism = Mechanism(**entries)
             findings = [finding for finding in mechanism.checked if finding.severity is not Severity.ERROR]
     except MechanismError as error:
         findings += error.findings
-        mechanism = _without_friction(entries)
-    bare = mechanism is not None and any(finding.severity is Severity.ERROR for finding in findings)
-    return Loaded(text, entries, lines, mechanism, tuple(place(findings, "", lines, entries)), bare)
+        with suppress(MechanismError, TypeError, AttributeError):  # the last two of joints that are no groups
+            mechanism = Mechanism(**with_law(copy.deepcopy(dict(entries)), "off"))
+    return Loaded(text, entries, lines, mechanism, tuple(place(findings, "", lines, entries)))
 
 
 class Asked(dict[str, Any]):
@@ -160,27 +191,9 @@ class Asked(dict[str, Any]):
         return self.friction and bool(rubbing(self.state.run.system))
 
     @property
-    def run(self) -> Run:
-        """The mechanism prepared; MechanismError where it has no motion."""
-        return self.state.run if self.friction else self.state.frictionless_run
-
-    @property
-    def motion(self) -> xr.Dataset:
-        """Its positions, without figures of the cycle."""
-        return self.state.motion(self.steps, self.friction)
-
-    @property
-    def result(self) -> xr.Dataset:
-        """What `analyse` gives of it."""
-        return self.state.result(self.steps, self.friction)
-
-
-def _without_friction(entries: Mapping[str, Any]) -> Mechanism | None:
-    """The mechanism without what is stated of friction; None where that is not what is wrong with it."""
-    try:
-        return Mechanism(**with_law(copy.deepcopy(dict(entries)), "off"))
-    except (MechanismError, TypeError, AttributeError):  # the last two of joints that are no groups of entries
-        return None
+    def cycle(self) -> Cycle:
+        """Its cycle; MechanismError where it has no motion."""
+        return self.state.cycle(self.steps, self.friction)
 
 
 def _refusals(entries: Mapping[str, Any]) -> list[Finding]:

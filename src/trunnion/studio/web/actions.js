@@ -71,7 +71,6 @@ async function answered() {
   const sent = state.text.value;
   const friction = state.friction.value;
   const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated" };
-  if (!state.answer.value && sent.trim()) outlined(asked);
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
@@ -83,14 +82,6 @@ async function answered() {
   if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   await coming;
-}
-
-/** Links and joints at their start, drawn while the first answer is awaited. */
-async function outlined(asked) {
-  const found = await link.ask("outline", asked);
-  if (!found || found.error || state.answer.value || asked.text !== state.text.value) return;
-  if (!Object.keys(state.places.value).length) state.places.value = found.places;
-  state.answer.value = { ...found, outline: true, solved: false, scene: null, findings: [], missing: [], ready: [], text: asked.text, friction: asked.friction };
 }
 
 /** Ask for findings and figures of the whole cycle; one question at a time, for a long one would hold up the next. */

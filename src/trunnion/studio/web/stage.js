@@ -96,7 +96,7 @@ function show(view) {
   }
   pose(view, found.scene, index, state.share.value);
   if (view.fresh && view.sized) {
-    view.fresh = Boolean(state.answer.peek()?.outline); // the whole motion is to be in view
+    view.fresh = false;
     untracked(sheet.fit);
   }
   untracked(() => chosen(view));

@@ -121,6 +121,16 @@ def test_a_passage_is_told_once_however_few_the_positions() -> None:
     assert len({figures["at"] for figures in found.values()}) == len(found)
 
 
+@pytest.mark.parametrize("steps", [7, 36])
+def test_a_measure_is_the_figure_of_the_summary_where_pins_cross_their_play(steps: int) -> None:
+    """Whichever positions are next to a crossing."""
+    data = read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["measures"] = {name: {"effort": "A", "as": name} for name in ("minimum", "maximum", "rms")}
+    figures = {one.name: one.value for one in analyse(Mechanism(**data), steps=steps).trunnion.summary}
+    for name, key in (("minimum", "effort_min"), ("maximum", "effort_max"), ("rms", "effort_rms")):
+        assert figures[name] == pytest.approx(figures[f"A.{key}"], rel=1e-6)
+
+
 def massless_compressor() -> dict[str, Any]:
     """The model's data, pins in loaded seats; without pressure, from 40° to 180°, nothing presses."""
     data = read(EXAMPLES / "slider-crank.yaml").data()

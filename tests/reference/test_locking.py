@@ -29,7 +29,7 @@ from mechanisms import (
 from mechanisms_space import cardan, rssr
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status, locking
-from trunnion.cycle.locking_course import locks, multiples_at
+from trunnion.cycle.locking_course import multiples_at
 from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.margin import locking_margin
@@ -316,7 +316,8 @@ def margins(run: Run, time: Numbers) -> Numbers:
 
 def locked(run: Run, time: Numbers, multiple: Numbers) -> Numbers:
     with np.errstate(all="ignore"):
-        return locks(run.solve(time, method=FrictionMethod(multiple=multiple)))
+        back = run.solve(time, method=FrictionMethod(multiple=multiple))
+        return np.broadcast_to(np.less(back.share, 1.0), time.shape)
 
 
 @pytest.mark.sample(10)

@@ -19,9 +19,8 @@ from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.seating import UNSETTLED, Seating
 
-__all__ = ["EARLES_WU", "find"]
+__all__ = ["find"]
 
-EARLES_WU = 1.0  # rad/(N s)
 INSIDE = 1e-9  # of the cycle: positions at the ends of a time belong to it
 
 Array = NDArray[np.float64]

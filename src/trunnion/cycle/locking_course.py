@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import floor, isfinite, isnan, log10
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HEAD", "HELD_AND_DRIVEN", "NEAR", "NO_MARGIN", "LockingCourse", "LockingRange", "LockingState", "Passage",
-    "critical_figure", "critical_multiples", "holding_multiples", "least_margin", "locking_course", "locks",
+    "critical_figure", "critical_multiples", "holding_multiples", "least_margin", "locking_course",
     "multiples_at", "passed",
 ]  # fmt: skip
 
@@ -65,31 +65,20 @@ SHARE = 1e-5  # of the drive's travel, where that is not in degrees
 
 
 class LockingState(Coded):
-    """What friction does at a position, forward and when all speeds are reversed; in a sentence, and for tables.
+    """What friction does at a position, forward and when all speeds are reversed.
 
     The loads are all that acts: loads and springs, useful or not, weight and inertia.
     """
 
-    short: str
-
-    RUNS = 0, "runs; what acts on it pushes it neither backward nor forward", "loads do not push"
-    BACKDRIVABLE = 1, "can be backdriven: the loads drive it backward, and the drive brakes it", "can be backdriven"
-    SELF_LOCKING = 2, "self-locking: the loads push it backward, but do not overcome friction", "self-locking"
-    LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward", "locked backward"
-    LOCKED = 4, "locked: no drive effort can move it forward", "locked"
-    JAMMED = 5, "jammed: locked forward and backward", "jammed"
-    UNSOLVED = 6, "not solved", "not solved"
-    SELF_LOCKING_FORWARD = (
-        7, "self-locking: the loads push it forward, but do not overcome friction", "self-locking, pushed forward",
-    )  # fmt: skip
-    DRIVEN_ON = 8, "the loads drive it forward, and the drive brakes it", "loads drive it on"
-
-    def __new__(cls, value: int, text: str, short: str) -> Self:
-        """A member: its code, what it says, and that in a word or two."""
-        state = int.__new__(cls, value)
-        state._value_ = value
-        state.text, state.short = text, short
-        return state
+    RUNS = 0, "loads do not push"  # neither backward nor forward
+    BACKDRIVABLE = 1, "can be backdriven"  # the loads drive it backward, and the drive brakes it
+    SELF_LOCKING = 2, "self-locking"  # the loads push it backward, but do not overcome friction
+    LOCKED_BACKWARD = 3, "locked backward"  # no drive effort can move it backward
+    LOCKED = 4, "locked"  # no drive effort can move it forward
+    JAMMED = 5, "jammed"  # locked forward and backward
+    UNSOLVED = 6, "not solved"
+    SELF_LOCKING_FORWARD = 7, "self-locking, pushed forward"  # by the loads, which do not overcome friction
+    DRIVEN_ON = 8, "loads drive it on"  # and the drive brakes it
 
 
 STATES = list(LockingState)  # by their codes
@@ -127,7 +116,8 @@ class Passage(NamedTuple):
         useful_power, acting = (
             sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape)) for powers in (useful, every)
         )
-        return cls(efforts, locks(back), delivered, acting, useful_power)
+        locked = np.broadcast_to(np.less(back.share, 1.0), shape)
+        return cls(efforts, locked, delivered, acting, useful_power)
 
 
 def passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
@@ -147,11 +137,6 @@ def solved_along(run: Run, walk: Forward, method: FrictionMethod) -> Backward:
     deflections = {joint: history.at(time) for joint, history in past.items()}
     with np.errstate(all="ignore"):
         return backward(walk, method, Given({}, deflections))
-
-
-def locks(back: Backward) -> NDArray[np.bool_]:
-    """Where a module locks."""
-    return np.broadcast_to(np.less(back.share, 1.0), np.shape(back.walk.time))
 
 
 # ---- multiples of the friction --------------------------------------------------------------------------------
@@ -291,7 +276,7 @@ class LockingRange(NamedTuple):
 
     def cells(self, near: float = NEAR) -> list[str]:
         """The row of the table with HEAD."""
-        state = f"margin below {near:g}" if self.state is None else self.state.short
+        state = f"margin below {near:g}" if self.state is None else self.state.text
         margin = readable(self.margin) if isfinite(self.margin) else f"more than {MARGIN:g}"
         return [state, *self.places, "—" if isnan(self.margin) else margin, self.at]
 

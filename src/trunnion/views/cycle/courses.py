@@ -432,8 +432,8 @@ def _states(result: xr.Dataset, over: Abscissa, named: bool) -> list[Mark]:
     for state, colour in STATES:
         for row in (row for row in rows if row["state"] == state.name.lower()):
             low, high = np.interp(row["times"], time, values)
-            name = state.short if named and state.short not in names_marked else None
-            names_marked.add(state.short)
+            name = state.text if named and state.text not in names_marked else None
+            names_marked.add(state.text)
             marks.append(Stripe(float(low), float(high), "", Look(colour, order=0.55), name))
     label = "drive effort changes sign" if named else None
     for before, after in pairwise(rows):

@@ -172,7 +172,7 @@ def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     upper = plots.figure(found, "locking").axes[0]
     spans = {patch.get_label(): patch for patch in upper.patches}
     limit = np.degrees(np.arccos(0.3))
-    held = spans[LockingState.SELF_LOCKING_FORWARD.short]
+    held = spans[LockingState.SELF_LOCKING_FORWARD.text]
     assert (held.get_x(), held.get_x() + held.get_width()) == pytest.approx((90, 180 - limit), abs=0.01)
     (line,) = [line for line in upper.lines if line.get_label() == "drive effort changes sign"]
     assert line.get_xdata()[0] == pytest.approx(180 - limit, abs=0.01)

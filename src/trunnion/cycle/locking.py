@@ -24,8 +24,9 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
-from trunnion.results.dataset import Variable, described, with_variables
+from trunnion.results.dataset import described, with_variables
 from trunnion.results.figure import Figure
+from trunnion.results.variables import LOCKING, along_positions
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run, prepare
@@ -40,27 +41,6 @@ __all__ = [
 
 MOST_STEPS = 8192
 METHOD = FrictionMethod(margin_up_to=MARGIN)
-
-VARIABLES = {
-    "critical_multiple": Variable(
-        ("joint", "position"), "1", "critical multiple of the friction of the joint alone, at which the position locks"
-    ),
-    "drive_effort_reverse": Variable(
-        ("driver", "position"), "effort", "drive effort of the reversed motion; NaN where it locks"
-    ),
-    "power_delivered_reverse": Variable(("position",), "W", "power delivered to the drivers when backdriven"),
-    "power_acting_reverse": Variable(
-        ("position",), "W", "power supplied by loads, springs, weight and inertia when backdriven"
-    ),
-    "power_given_reverse": Variable(("position",), "W", "power supplied by the useful loads when backdriven"),
-    "efficiency_reverse_instant": Variable(
-        ("position",), "1", "power delivered to the drivers over power supplied by the useful loads, backward"
-    ),
-    "holding_multiple": Variable(
-        ("position",), "1", "multiple of all friction down to which it holds the loads; NaN where it does not"
-    ),
-    "locking_state": Variable(("position",), "1", "what friction does forward and backward", np.int8),
-}
 
 
 @strict_arguments
@@ -106,7 +86,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "holding_multiple": holding_multiples(run, time),
         "locking_state": np.where(answered, state, int(LockingState.UNSOLVED)).astype(np.int8),
     }
-    result = with_variables(result, described(arrays, VARIABLES, member_units(run.system)))
+    result = with_variables(result, described(arrays, along_positions(LOCKING), member_units(run.system)))
     result["locking_state"].attrs.update(codes("flag", LockingState))
     notes = finding_rows(_notes(run))
     findings = {"findings": [*attribute(result, "findings"), *notes]} if notes else {}

@@ -27,8 +27,8 @@ class Variable:
 
     units: or a word for one that only a result knows, as "parameter" for that of its parameters, see `described`. Of
     what not every result has: part, such as "errors" of a mechanism with any; space, the only one, "planar" or
-    "spatial". column: what stands behind the name of its member in tables of a cycle, None in none; usual, motion: of
-    which tables.
+    "spatial". column: what stands behind the name of its member in tables of a cycle, None in none; tables: in which,
+    of "usual", "motion" and "rest".
     """
 
     dims: tuple[str, ...]
@@ -38,8 +38,7 @@ class Variable:
     part: str = ""
     space: str = ""
     column: str | None = None
-    usual: bool = True
-    motion: bool = False
+    tables: str = "usual"
 
     def over(self, *dims: str) -> Variable:
         """The same with more dimensions, last."""

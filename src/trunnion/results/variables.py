@@ -19,7 +19,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CYCLE", "OF_SOME_JOINTS", "SAME_AS", "VARIABLES", "dataset", "variables"]
+__all__ = ["CYCLE", "LOCKING", "OF_SOME_JOINTS", "SAME_AS", "VARIABLES", "along_positions", "dataset", "variables"]
 
 
 def _coordinate(
@@ -29,9 +29,7 @@ def _coordinate(
     parts = {"": ("", long_name), "_velocity": ("/s", f"rate of the {long_name}"),
              "_acceleration": ("/s^2", f"second derivative of the {long_name}")}  # fmt: skip
     return {
-        f"{name}{rate}": Variable(
-            (dim,), f"{unit}{per}", text, space=space, column=f"{column}{rate}", usual=k < usual, motion=True
-        )
+        f"{name}{rate}": _motion((dim,), f"{unit}{per}", text, f"{column}{rate}", space, k < usual)
         for k, (rate, (per, text)) in enumerate(parts.items())
     }
 
@@ -41,7 +39,15 @@ Dims = tuple[str, ...]
 
 def _motion(dims: Dims, unit: str, long_name: str, column: str, space: str = "", usual: bool = True) -> Variable:
     """A vector of the motion."""
-    return Variable(dims, unit, long_name, space=space, column=column, usual=usual, motion=True)
+    tables = "usual motion" if usual else "motion"
+    return Variable(dims, unit, long_name, space=space, column=column, tables=tables)
+
+
+def _rest(
+    dims: Dims, unit: str, long_name: str, dtype: type[Any] = np.float64, part: str = "", column: str = ""
+) -> Variable:  # fmt: skip
+    """What only the table of everything has."""
+    return Variable(dims, unit, long_name, dtype, part, column=column, tables="rest")
 
 
 def _bearing(dims: Dims, unit: str, long_name: str, column: str) -> Variable:
@@ -98,7 +104,7 @@ VARIABLES: dict[str, Variable] = {
         D, "effort", "least drive effort where a friction is an interval", column="effort_lower"),
     "drive_effort_upper": Variable(
         D, "effort", "largest drive effort where a friction is an interval", column="effort_upper"),
-    "drive_power": Variable(D, "W", "power of the driver"),
+    "drive_power": _rest(D, "W", "power of the driver", column="power"),
     "spring_force": Variable(
         S, "spring_force", "pull of the spring and its damper; a torque in a joint that turns", column="force"),
     "spring_elongation": Variable(
@@ -114,25 +120,28 @@ VARIABLES: dict[str, Variable] = {
         ("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first; on the rack or nut",
         column="force"),
     "useful_power": Variable(NOTHING, "W", "power delivered to the useful loads"),
-    "efficiency_instant": Variable(NOTHING, "1", "useful power over drive power"),
-    "closure_residual": Variable(NOTHING, "m", "largest opening of a closed loop"),
-    "condition": Variable(NOTHING, "1", "largest condition number of a module's Jacobian"),
-    "power_residual": Variable(NOTHING, "W", "drive + loads + inertia − friction power; 0 but for rounding"),
-    "friction_iterations": Variable(NOTHING, "1", "rounds to settle friction and reactions", np.int32),
-    "friction_change": Variable(NOTHING, "N", "largest change of a reaction in the last round"),
-    "friction_residual": Variable(
+    "efficiency_instant": _rest(NOTHING, "1", "useful power over drive power"),
+    "closure_residual": _rest(NOTHING, "m", "largest opening of a closed loop"),
+    "condition": _rest(NOTHING, "1", "largest condition number of a module's Jacobian"),
+    "power_residual": _rest(NOTHING, "W", "drive + loads + inertia − friction power; 0 but for rounding"),
+    "friction_iterations": _rest(NOTHING, "1", "rounds to settle friction and reactions", np.int32),
+    "friction_change": _rest(NOTHING, "N", "largest change of a reaction in the last round"),
+    "friction_residual": _rest(
         NOTHING, "N", "largest difference between a friction and its law for the load found"),
-    "friction_contraction": Variable(
+    "friction_contraction": _rest(
         NOTHING, "1", "contraction of the friction iteration; from 1 on it may diverge"),
-    "locking_margin": Variable(NOTHING, "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
+    "locking_margin": _rest(NOTHING, "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable(NOTHING, "1", "code of the position's status; see the attribute flag_meanings", np.int8),
     "point_error": _error(PA, "m", "place of the point against the ideal mechanism", "error"),
-    "link_error": _error(("link",), "rad", "angle of the link against the ideal mechanism"),
+    "link_error": _rest(
+        ("link",), "rad", "angle of the link against the ideal mechanism", part="errors", column="angle_error"),
     "joint_rotation_error": _error(J, "rad", "rotation of the joint against the ideal mechanism", "rotation_error"),
     "joint_slide_error": _error(J, "m", "slide of the joint against the ideal mechanism", "slide_error"),
     "reaction_force_change": _error(JA, "N", "reaction less that of the ideal mechanism", "reaction_change"),
     "drive_effort_change": _error(D, "effort", "drive effort less that of the ideal mechanism", "effort_change"),
-    "friction_power_change": _error(J, "W", "power lost to friction less that of the ideal mechanism"),
+    "friction_power_change": _rest(
+        J, "W", "power lost to friction less that of the ideal mechanism", part="errors",
+        column="friction_power_change"),
     "seat_offset": _seat(JE, "m", "offset of the pin's axis from the hole's at each end, hole's axes", "seat"),
     "end_force": _seat(JE, "N", "force of the pin on each end of its hole, hole's axes", "end_force"),
     "contact_position": _seat(JE, "m", "place where the pin touches its hole at each end", "contact"),
@@ -140,19 +149,41 @@ VARIABLES: dict[str, Variable] = {
     "seat_xi": _seat(J, "rad", "direction ξ of a pin's seat in its hole", "seat_xi"),
     "seat_xi_pin": _seat(J, "rad", "direction ξ of a pin's seat in the pin's own frame", "seat_xi_pin"),
     "contact_lost": _seat(J, "1", "1 where the pin loses contact", "contact_lost", np.int8),
-    "contact_loss_number": _seat(J, "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)"),
-    "seat_travel": _seat(
-        NOTHING, "1", "1 where velocities and accelerations include the motion of pins within their play",
-        dtype=np.int8),
+    "contact_loss_number": _rest(
+        J, "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats",
+        column="contact_loss_number"),
+    "seat_travel": _rest(
+        NOTHING, "1", "1 where velocities and accelerations include the motion of pins within their play", np.int8,
+        "seats"),
     "seat_rounds": _seat(NOTHING, "1", "iterations of seats and reactions", dtype=np.int32),
-    "seat_change": _seat(NOTHING, "1", "change of a seat in one more iteration, relative to its clearance"),
+    "seat_change": _rest(
+        NOTHING, "1", "change of a seat in one more iteration, relative to its clearance", part="seats"),
 }  # fmt: skip
 # what is a vector in space
-IN_SPACE = {
+IN_SPACE: dict[str, Variable] = {
     "reaction_moment": Variable(JA, "N m", "reaction moment on the second link, about the middle of the bearing"),
     "friction_torque": Variable(J, "N m", "friction torque on the second link about its axis, or against its turn"),
-    "link_error": _error(LA, "rad", "rotation vector of the link against the ideal mechanism"),
+    "link_error": _rest(
+        LA, "rad", "rotation vector of the link against the ideal mechanism", part="errors", column="error"
+    ),
 }
+# what `locking` adds
+LOCKING: dict[str, Variable] = {
+    "critical_multiple": _rest(
+        J, "1", "critical multiple of the friction of the joint alone, at which the position locks",
+        column="critical_multiple"),
+    "drive_effort_reverse": _rest(
+        D, "effort", "drive effort of the reversed motion; NaN where it locks", column="effort_reverse"),
+    "efficiency_reverse_instant": _rest(
+        NOTHING, "1", "power delivered to the drivers over power supplied by the useful loads, backward"),
+    "power_delivered_reverse": _rest(NOTHING, "W", "power delivered to the drivers when backdriven"),
+    "power_acting_reverse": _rest(
+        NOTHING, "W", "power supplied by loads, springs, weight and inertia when backdriven"),
+    "power_given_reverse": _rest(NOTHING, "W", "power supplied by the useful loads when backdriven"),
+    "holding_multiple": _rest(
+        NOTHING, "1", "multiple of all friction down to which it holds the loads; NaN where it does not"),
+    "locking_state": Variable(NOTHING, "1", "what friction does forward and backward", np.int8),
+}  # fmt: skip
 OF_SOME_JOINTS = ("seats", "bearings")  # parts whose numbers not every joint has
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
@@ -183,9 +214,14 @@ def variables(space: str) -> dict[str, Variable]:
     return {**both, **IN_SPACE} if space == "spatial" else both
 
 
+def along_positions(of: Mapping[str, Variable]) -> dict[str, Variable]:
+    """The same at every position of a cycle."""
+    return {name: variable.over("position") for name, variable in of.items()}
+
+
 @functools.cache
-def _along_positions(space: str) -> dict[str, Variable]:
-    return {name: variable.over("position") for name, variable in variables(space).items()}
+def _vocabulary(space: str) -> dict[str, Variable]:
+    return along_positions(variables(space))
 
 
 def _space(labels: Labels) -> str:
@@ -211,7 +247,7 @@ def dataset(
     its variables at every position that it has, all if not given; dtype: of their floats. Where that is another than
     theirs, arrays are taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
-    vocabulary = _along_positions(_space(labels))
+    vocabulary = _vocabulary(_space(labels))
     names = [name for name in arrays if names_kept is None or name in names_kept]
     other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
     numbers = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}

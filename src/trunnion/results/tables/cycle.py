@@ -6,7 +6,7 @@ dimensions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,8 @@ import numpy as np
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.results.dataset import Column, flat, unit_of
-from trunnion.results.variables import VARIABLES
+from trunnion.results.dataset import Column, Variable, flat, unit_of
+from trunnion.results.variables import LOCKING, VARIABLES, variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,30 +32,13 @@ Has = Callable[[int, str, tuple[int, ...]], bool]  # whether a member has a vari
 MEMBERS = ("joint", "driver", "spring", "gear", "link", "point")  # in the order of the columns
 
 
-def _stems(dim: str, motion: bool) -> Stems:
-    """What stands behind the name of a member of a dimension: of the usual tables, or of that of the motion."""
+def _stems(dim: str, table: str) -> Stems:
+    """What stands behind the name of a member of a dimension in a table."""
     return {
         name: variable.column
         for name, variable in VARIABLES.items()
-        if variable.dims[:1] == (dim,) and variable.column is not None
-        if (variable.motion if motion else variable.usual)
+        if variable.dims[:1] == (dim,) and variable.column is not None and table in variable.tables
     }
-
-
-# what only `rest` has, beside the motion: variable, the dimension of its members, what stands behind their names
-REST = (
-    ("drive_power", "driver", "power"),
-    ("drive_effort_reverse", "driver", "effort_reverse"),
-    ("critical_multiple", "joint", "critical_multiple"),
-    ("friction_power_change", "joint", "friction_power_change"),
-    ("contact_loss_number", "joint", "contact_loss_number"),
-    *((name, "", name) for name in (
-        "efficiency_instant", "locking_margin", "power_delivered_reverse", "power_acting_reverse",
-        "power_given_reverse", "efficiency_reverse_instant", "holding_multiple",
-        "closure_residual", "condition", "power_residual", "friction_iterations", "friction_change",
-        "friction_residual", "friction_contraction", "seat_change", "seat_travel",
-    )),
-)  # fmt: skip
 
 
 def time_column(result: xr.Dataset) -> list[Column]:
@@ -88,7 +71,7 @@ def of_members(result: xr.Dataset, dim: str, stems: Stems, has: Has = lambda *_:
 
 def positions(result: xr.Dataset) -> list[Column]:
     """Joints, drivers, springs, gears, links and points, power, status and measures."""
-    columns = [*time_column(result), *_members(result)]
+    columns = [*time_column(result), *_members(result, "usual")]
     if "drive_power" in result:
         columns.append(Column("power_in", "W", result["drive_power"].values.sum(axis=0)))
     columns += [*flat(result, "useful_power", "power_useful"), *flat(result, "seat_rounds", "seat_rounds")]
@@ -97,19 +80,18 @@ def positions(result: xr.Dataset) -> list[Column]:
 
 def motion(result: xr.Dataset) -> list[Column]:
     """Coordinates, velocities and accelerations of joints, links and points."""
-    return [*time_column(result), *_members(result, motion=True)]
+    return [*time_column(result), *_members(result, "motion")]
 
 
 def rest(result: xr.Dataset) -> list[Column]:
     """What else there is at each position: powers, efficiency, margins, and how well it is solved."""
-    columns: list[Column] = []
-    for variable, dim, name in REST:
-        columns += of_members(result, dim, {variable: name}) if dim else flat(result, variable, name)
-    columns += _locking_state(result)
-    if "link_error" in result:
-        stem = "error" if "axis" in result["link_error"].dims else "angle_error"
-        columns += of_members(result, "link", {"link_error": stem})
-    return columns
+    space = attribute(result, "scene", "{}").get("space", "planar")
+    columns = [
+        column
+        for name, variable in (variables(space) | LOCKING).items() if variable.tables == "rest"
+        for column in _columns(result, name, variable)
+    ]  # fmt: skip
+    return [*columns, *_locking_state(result)]
 
 
 def locking(result: xr.Dataset) -> list[Column]:
@@ -117,19 +99,22 @@ def locking(result: xr.Dataset) -> list[Column]:
     columns = time_column(result)
     if "drive" in result.coords:
         columns += flat(result, "drive", "drive")
-    columns += [
-        column
-        for column in rest(result)
-        if column.name == "locking_margin" or column.name.endswith(".critical_multiple")
-    ]
-    columns += of_members(result, "driver", {"drive_effort": "effort", "drive_effort_reverse": "effort_reverse"})
-    for name in ("efficiency_instant", "efficiency_reverse_instant", "power_delivered_reverse", "power_acting_reverse",
-                 "power_given_reverse", "holding_multiple"):  # fmt: skip
-        columns += flat(result, name, name)
+    variables_of = VARIABLES | LOCKING
+    names = ["critical_multiple", "locking_margin", "drive_effort", "drive_effort_reverse", "efficiency_instant"]
+    for name in dict.fromkeys([*names, *LOCKING]):
+        columns += _columns(result, name, variables_of[name])
     return [*columns, *_locking_state(result), status_column(result)]
 
 
-def _members(result: xr.Dataset, motion: bool = False) -> Iterator[Column]:
+def _columns(result: xr.Dataset, name: str, variable: Variable) -> Iterable[Column]:
+    """The columns of a variable, those of its members if it has any; none of one that no table has."""
+    if variable.column is None:
+        return []
+    members = variable.dims[:1]
+    return of_members(result, members[0], {name: variable.column}) if members else flat(result, name, name)
+
+
+def _members(result: xr.Dataset, table: str) -> Iterator[Column]:
     """The columns of members, of joints those that their kinds have."""
     scene = attribute(result, "scene", "{}")
     spatial = scene.get("space") == "spatial"
@@ -144,7 +129,7 @@ def _members(result: xr.Dataset, motion: bool = False) -> Iterator[Column]:
         return _has(kinds[i], variable, spatial)
 
     for dim in MEMBERS:
-        stems = _stems(dim, motion)
+        stems = _stems(dim, table)
         yield from of_members(result, dim, stems, moves) if dim == "joint" else of_members(result, dim, stems)
 
 

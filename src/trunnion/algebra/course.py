@@ -173,20 +173,13 @@ class Courses:
 
     def between(self, low: float, high: float) -> Courses:
         """The same rows from one time to another, s."""
-        first, last = self.panel(np.array([low, high]))
-        last += int(high > self.edges[last])
-        near = replace(
-            self,
-            edges=self.edges[first : last + 1],
-            coefficients=self.coefficients[first:last],
-            states=self.states[first:last],
-        ).parted(np.array([low, high]))
-        begin, end = np.searchsorted(near.edges, [low, high])
+        cut = self.parted(np.array([low, high]))
+        begin, end = np.searchsorted(cut.edges, [low, high])
         return replace(
-            near,
-            edges=near.edges[begin : end + 1],
-            coefficients=near.coefficients[begin:end],
-            states=near.states[begin:end],
+            cut,
+            edges=cut.edges[begin : end + 1],
+            coefficients=cut.coefficients[begin:end],
+            states=cut.states[begin:end],
         )
 
     def panels_of(self, time: Array) -> Labels:

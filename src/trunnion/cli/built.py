@@ -1,9 +1,8 @@
 """`trunnion assemble`, `play`, `tolerance` and `allocate`: mechanisms as they are built."""
 
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from typer import Option
 
@@ -24,21 +23,19 @@ __all__ = ["allocate", "assemble", "play", "tolerance"]
 
 # ---- assemble --------------------------------------------------------------------------------------------------------
 
-Uniform = StrEnum("Uniform", ["pins", "all"])
-
 
 @verb(
     lacks="table friction seat columns",
     uniform="Joints with one common clearance: pins, or all kinds of play.",
 )
-def assemble(model: Model, files: Files, steps: int = 360, uniform: Uniform = Uniform.pins) -> None:
+def assemble(model: Model, files: Files, steps: int = 360, uniform: Literal["pins", "all"] = "pins") -> None:
     """Clearance needed to assemble a linkage with axis errors."""
     from trunnion.studies.assembly import assemble as run
 
     check_files(files)
     mechanism = model.read()
     with model.lines(), bar("positions", steps, least=1000) as progress:
-        result = run(mechanism, steps, uniform.value, progress)  # type: ignore[arg-type]  # it checks it
+        result = run(mechanism, steps, uniform, progress)
     Shown(result, model, files, "assembly").finish()
 
 
@@ -116,8 +113,8 @@ OF_ALLOCATION = (
     "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
     f"accuracy, {CURVES}."
 )
-Criterion = StrEnum("Criterion", {"worst_case": "worst-case", "rss": "rss", "yield_": "yield"})
-Choice = StrEnum("Choice", ["auto", "continuous", "discrete"])
+Criterion = Literal["worst-case", "rss", "yield"]
+Choice = Literal["auto", "continuous", "discrete"]
 
 
 @verb(
@@ -137,7 +134,7 @@ Choice = StrEnum("Choice", ["auto", "continuous", "discrete"])
 )  # fmt: skip
 def allocate(
     model: Model, files: Files, measure: list[str] | None = None, criterion: Criterion | None = None,
-    target: float | None = None, choice: Choice = Choice.auto, exact: bool = False, sure: bool = False,
+    target: float | None = None, choice: Choice = "auto", exact: bool = False, sure: bool = False,
     curve: int = 0, at: str | None = None, steps: int = 360, samples: int = 10_000, seed: int = 1,
     jobs: int | None = None, write: Path | None = None, force: bool = False, kind: str | None = None,
 ) -> None:  # fmt: skip
@@ -150,15 +147,15 @@ def allocate(
 
     check_files(files, "allocation", kind)
     check_model(write, model.file, force)
-    if target is not None and criterion not in (None, Criterion.yield_):
+    if target is not None and criterion not in (None, "yield"):
         what = f"the criterion {criterion} does not use a yield of {target:g}"
         raise MechanismError(Finding(what, "--yield", f"remove --yield, or remove --criterion {criterion}"))
-    by = Criterion.yield_ if target is not None else criterion or Criterion.worst_case
+    by: Criterion = "yield" if target is not None else criterion or "worst-case"
     mechanism = model.read()
     with model.lines(), bar("samples", samples, least=1000) as progress:
         result = run(
-            mechanism, measure, by.value, target, choice.value, steps, at, samples,  # type: ignore[arg-type]
-            seed, curve, exact=exact, sure=sure, jobs=jobs, progress=progress,
+            mechanism, measure, by, target, choice, steps, at, samples, seed,
+            curve, exact=exact, sure=sure, jobs=jobs, progress=progress,
         )  # fmt: skip
     allocated, findings = bool(result.attrs["found"]), _named(findings_of(result), mechanism)
     if not allocated:  # there is nothing to draw then

@@ -11,9 +11,8 @@ import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping
 from copy import copy
 from dataclasses import MISSING, fields, is_dataclass, replace
-from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from typer import Option
 from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
@@ -118,14 +117,14 @@ def _types(group: type) -> Hints:
 def _word(hint: Any) -> str | None:
     """The word of the help for a value of a type; none for a switch."""
     kind = next(types_in(hint))
-    if issubclass(kind, Enum):
-        return "|".join(str(member.value) for member in kind)
+    if get_origin(kind) is Literal:
+        return "|".join(get_args(kind))
     return {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(kind)
 
 
 def types_in(hint: Any) -> Iterator[type]:
-    """The types that a type is made of: of `list[str] | None` text and none."""
-    parts = get_args(hint)
+    """The types that a type is made of: of `list[str] | None` text and none; choices are one type."""
+    parts = () if get_origin(hint) is Literal else get_args(hint)
     for part in parts:
         yield from types_in(part)
     if not parts:

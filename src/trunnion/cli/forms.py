@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from enum import Enum
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from trunnion.cli.built import allocate, assemble, play, tolerance
 from trunnion.cli.files import options_of, types_in
@@ -44,7 +43,7 @@ def _fields(study: Callable[..., None]) -> Iterator[dict[str, Any]]:
         types = set(types_in(hint))
         if name.strip("_") in LEFT_OUT or Path in types:
             continue
-        choices = [[str(member.value) for member in part] for part in types if issubclass(part, Enum)]
+        choices = [list(get_args(part)) for part in types if get_origin(part) is Literal]
         value = usual[name] if usual[name] not in (None, False, Parameter.empty) else ""
         yield {
             "flag": flag.partition("/")[0],
@@ -52,5 +51,5 @@ def _fields(study: Callable[..., None]) -> Iterator[dict[str, Any]]:
             "kind": "flag" if bool in types else "number" if types & {int, float} else "text",
             "choices": choices[0] if choices else None,
             "several": any(get_origin(part) is list for part in (hint, *get_args(hint))),
-            "usual": str(getattr(value, "value", value)),
+            "usual": str(value),
         }

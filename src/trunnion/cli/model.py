@@ -4,9 +4,8 @@ import json
 import math
 import os
 import socket
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from typer import Argument, Option
 
@@ -156,8 +155,6 @@ def _bound(stated: int | None) -> socket.socket:
 
 # ---- examples and schema ------------------------------------------------------------------------------------------
 
-FileKind = StrEnum("FileKind", ["model", "data"])  # files that have a JSON Schema
-
 
 @verb(
     name=Argument(help="Example to copy; without it, all are listed."),
@@ -188,9 +185,9 @@ def examples(name: str | None = None, to: Path = Path(), force: bool = False) ->
 
 
 @verb(of="File: model, or data for the mapping of measured data.", out="Write it to a file.")
-def schema(of: FileKind = FileKind.model, out: Path | None = None) -> None:
+def schema(of: Literal["model", "data"] = "model", out: Path | None = None) -> None:
     """Print the JSON Schema of model or mapping file, for editors."""
-    if of is FileKind.data:
+    if of == "data":
         from trunnion.rig.reading.mapping import schema_text
 
         text = schema_text()

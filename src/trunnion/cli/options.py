@@ -4,9 +4,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from typer import Argument, Option
 
@@ -60,8 +59,6 @@ OPTIONS: dict[str, Any] = {
     "mapping": Argument(help="Mapping of the data: YAML, JSON or TOML."),
     "data": Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS, NetCDF."),
 }
-
-TableUnits = StrEnum("TableUnits", ["si", "model"])
 
 
 @dataclass
@@ -134,7 +131,7 @@ class Files:
     out: list[Path] | None = None
     report: Path | None = None
     units_row: bool = False
-    units: TableUnits = TableUnits.si
+    units: Literal["si", "model"] = "si"
     columns: list[str] | None = None
 
 

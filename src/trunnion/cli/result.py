@@ -149,7 +149,7 @@ class Shown:
             else:
                 from trunnion.results.save import save
 
-                save(self.dataset, path, files.units_row, files.columns, files.units)  # type: ignore[arg-type]  # it checks them
+                save(self.dataset, path, files.units_row, files.columns, files.units)
             self.written.append(path)
         if files.report is not None:
             from trunnion.views.shown import report_of

@@ -201,7 +201,7 @@ def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
 def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     """Efficiency of the cycle, with its error, and without errors of the joints."""
     means = course.means
-    note = _meaning(cycle.mechanism, means, course.status)
+    note = _meaning(means, course.status)
     yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=note)
     yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
     if cycle.at.ideal is not None:
@@ -209,7 +209,7 @@ def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         yield Figure("efficiency_ideal", "efficiency of the cycle without errors", ideal)
 
 
-def _meaning(mechanism: Mechanism, means: Means, status: NDArray[Any]) -> str:
+def _meaning(means: Means, status: NDArray[Any]) -> str:
     """What an efficiency of 0, or below it, or none, means. status: of the positions."""
     value = means.efficiency
     if not means.has_useful_work:

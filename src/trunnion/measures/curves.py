@@ -279,11 +279,6 @@ def _of_joint(measure: MotionRequest, walk: Forward) -> Number:
     return _turn_or_slide(measure, walk, walk.coordinates(measure.subject))
 
 
-def _of_no_cycle(measure: MotionRequest, walk: Forward) -> Number:
-    """None: a figure of a motion in time is no course over a cycle, see `dynamics.measured`."""
-    return np.nan
-
-
 CURVES: dict[str, Callable[[MotionRequest, Any], Number | tuple[Number, ...]]] = {
     "point": value,
     "path_error": lambda measure, walk: tuple(_point(measure, walk).place),
@@ -311,5 +306,6 @@ CURVES: dict[str, Callable[[MotionRequest, Any], Number | tuple[Number, ...]]] =
     "friction_energy": _friction_energy,
     "efficiency": _efficiency,
     "locking_margin": _locking_margin,
-    **dict.fromkeys(("starting_time", "steady_speed", "fluctuation", "peak_effort"), _of_no_cycle),
+    # of a motion in time, which is no course over a cycle: see `dynamics.measured`
+    **dict.fromkeys(("starting_time", "steady_speed", "fluctuation", "peak_effort"), lambda measure, walk: np.nan),
 }

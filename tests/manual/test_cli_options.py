@@ -17,7 +17,7 @@ from manual.test_cli import EXAMPLES
 from trunnion.cli import app as cli
 from trunnion.cli.options import PLOT_KINDS, over, points
 from trunnion.cli.terminal import QUIET, say, show_rows
-from trunnion.cycle.vocabulary import vocabulary
+from trunnion.cycle.vocabulary import NamedNumber, vocabulary
 from trunnion.errors import Finding, Severity
 from trunnion.views.cycle.plots import PLOTS
 
@@ -103,21 +103,17 @@ def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
     assert "are at the middle of their play" in free.err + free.out
 
 
-def test_the_list_and_its_file(program: Run, tmp_path: Path) -> None:
-    code, out, _ = program("check", SLIDER, "--set", "crank=52mm", "--list", "--out", "list.json")
+def test_the_list(program: Run) -> None:
+    code, out, _ = program("check", SLIDER, "--set", "crank=52mm", "--list")
     assert code == 0
     assert all(
         name in out for name in ("transmission_angle:Q", "velocity:piston.Q.x", "stroke-position", "O.pin.radius")
     )
-    found = json.loads((tmp_path / "list.json").read_text("utf-8"))
-    numbers, measures = ({one["name"]: one for one in found[key]} for key in ("numbers", "measures"))
-    assert numbers["crank"] == {
-        "name": "crank", "path": "dimensions.crank", "unit": "m", "value": 0.052, "written": "52mm", "swept": True,
-    }  # fmt: skip
-    assert measures["drive-torque"]["stated"]
-    assert measures["effort:O"]["value"] == measures["drive-torque"]["value"]
-    listed = vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"})).data()
-    assert found == json.loads(json.dumps(listed))
+    words = vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"}))
+    numbers, measures = ({one.name: one for one in each} for each in (words.numbers, words.measures))
+    assert numbers["crank"] == NamedNumber("crank", "dimensions.crank", "m", 0.052, "52mm", True)
+    assert measures["drive-torque"].stated
+    assert measures["effort:O"].value == measures["drive-torque"].value
 
 
 HEAD = ["", "linear", "searched", "Monte Carlo", "of variance"]

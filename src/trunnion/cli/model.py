@@ -1,6 +1,5 @@
 """`trunnion check`, `examples`, `schema` and `studio`: the model file itself."""
 
-import json
 import math
 import os
 import socket
@@ -11,7 +10,7 @@ from typer import Argument, Option
 
 from trunnion.cli.files import verb
 from trunnion.cli.options import Model, placed
-from trunnion.cli.result import check_target, end, write_text
+from trunnion.cli.result import end, write_text
 from trunnion.cli.terminal import line, say, show_rows, wrote
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import folder, whole
@@ -32,12 +31,11 @@ HEAD = ["name", "value", "unit"]
     lacks="seat",
     assemblies="Also draw the assembly modes of each group: a .png, .svg or .pdf file.",
     list="List what can be set, swept and measured, with units and values.",
-    out="Write that list: a .json file.",
 )
-def check(model: Model, assemblies: Path | None = None, list_: bool = False, out: Path | None = None) -> None:
+def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> None:
     """Check a model: findings, mobility, structure, assembly modes."""
-    if list_ or out:
-        _list(model, out)
+    if list_:
+        _list(model)
         return
     from trunnion.cycle.inspect import check as inspect
 
@@ -79,13 +77,11 @@ def _show_structure(checked: "Check", drivers: int) -> None:
         line(f"gears    {gear_line(pair)}")
 
 
-def _list(model: Model, out: Path | None) -> None:
-    """Print what can be set, swept and measured, and write it if a file is named."""
+def _list(model: Model) -> None:
+    """Print what can be set, swept and measured."""
     from trunnion.cycle.vocabulary import vocabulary
 
     mechanism = model.read()
-    if out is not None:
-        check_target(out, "--out", "the list", (".json",))
     with model.lines():
         words = vocabulary(mechanism)
     for swept, use in ((True, "parameters for --set and sweep --over"), (False, "parameters for --set only")):
@@ -96,9 +92,6 @@ def _list(model: Model, out: Path | None) -> None:
     title = "measures: figures of the cycle, or values at the start"
     show_rows(title, [*HEAD, "what"], [_row(measure, measure.text) for measure in measures])
     say(placed(words.findings, model.file, ["measures"]))
-    if out is not None:
-        write_text(json.dumps(words.data(), ensure_ascii=False, indent=1) + "\n", out)
-        wrote(out)
 
 
 def _row(entry: "NamedNumber | NamedMeasure", text: str) -> list[str]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,15 +65,6 @@ class Vocabulary:
     numbers: tuple[NamedNumber, ...]
     measures: tuple[NamedMeasure, ...]
     findings: tuple[Finding, ...] = ()
-
-    def data(self) -> dict[str, Any]:
-        """For JSON: null in place of a number that is none."""
-
-        def row(entry: NamedNumber | NamedMeasure) -> dict[str, Any]:
-            return {**asdict(entry), "value": entry.value if np.isfinite(entry.value) else None}
-
-        rows = {"numbers": list(map(row, self.numbers)), "measures": list(map(row, self.measures))}
-        return {**rows, "findings": list(map(str, self.findings))}
 
 
 @np.errstate(all="ignore")

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["allocate", "assemble", "play", "tolerance"]
 
 
-# ---- assemble --------------------------------------------------------------------------------------------------------
-
-
 @verb(
     lacks="table friction seat columns",
     uniform="Joints with one common clearance: pins, or all kinds of play.",
@@ -37,9 +34,6 @@ def assemble(model: Model, files: Files, steps: int = 360, uniform: Literal["pin
     with model.lines(), bar("positions", steps, least=1000) as progress:
         result = run(mechanism, steps, uniform, progress)
     Shown(result, model, files, "assembly").finish()
-
-
-# ---- play ------------------------------------------------------------------------------------------------------------
 
 
 @verb(lacks="seat columns", at=ONE_POSITION)
@@ -60,8 +54,6 @@ def play(
         result = run(mechanism, measure, steps, at)
     Shown(result, model, files, "measures joints", uncut, tables=tables(result), apart=False).finish()
 
-
-# ---- tolerance -------------------------------------------------------------------------------------------------------
 
 OF_TOLERANCE = f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {CURVES}."
 SECTIONS = "measures joints tolerances"
@@ -105,8 +97,6 @@ def tolerance(
         )  # fmt: skip
     Shown(result, model, files, SECTIONS, drawn={"kind": kind}, tables=tables(result)).finish()
 
-
-# ---- allocate --------------------------------------------------------------------------------------------------------
 
 DIGITS = 5  # significant ones of a tolerance in the model that is written
 OF_ALLOCATION = (

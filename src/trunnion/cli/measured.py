@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["compare", "data", "estimated", "identify", "rig"]
 
 
-# ---- rig -------------------------------------------------------------------------------------------------------------
-
 FEWEST = 20  # conditions from which a progress bar is worth it
 MOST_COMPARED, MOST_IDENTIFIED = 40, 24  # rows of the tables that are printed
 
@@ -70,9 +68,6 @@ def rig(model: Model, rig_file: Path, out: Path | None = None, format_: str = ""
     raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
 
 
-# ---- data ------------------------------------------------------------------------------------------------------------
-
-
 @verb(
     lacks="report units columns",
     out=DATA,
@@ -95,9 +90,6 @@ def data(mapping: Path, shared: Files, files: list[Path] | None = None) -> None:
         wrote(path)
     say(measurement.findings)
     raise typer.Exit(int(any(finding.severity is not Severity.NOTE for finding in measurement.findings)))
-
-
-# ---- compare ---------------------------------------------------------------------------------------------------------
 
 
 @verb(
@@ -131,9 +123,6 @@ def compare(
         drawn={"kind": kind, "condition": condition, "channel": channel[0] if channel and len(channel) == 1 else None},
         others=gathered(measurement.findings),
     ).finish(int(not result.attrs["all_within"] or errors))  # fmt: skip
-
-
-# ---- identify --------------------------------------------------------------------------------------------------------
 
 
 @verb(

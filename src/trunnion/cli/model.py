@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["check", "examples", "schema", "studio"]
 
 
-# ---- check -----------------------------------------------------------------------------------------------------------
-
 HEAD = ["name", "value", "unit"]
 
 
@@ -100,8 +98,6 @@ def _row(entry: "NamedNumber | NamedMeasure", text: str) -> list[str]:
     return [entry.name, value, "" if entry.unit in ("1", "SI") else entry.unit, text]
 
 
-# ---- studio ----------------------------------------------------------------------------------------------------------
-
 USUAL = 8765
 
 
@@ -144,9 +140,6 @@ def _bound(stated: int | None) -> socket.socket:
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or str(error)
     raise MechanismError(Finding(f"port {stated} cannot be had: {reason}", "--port", "choose another, or 0"))
-
-
-# ---- examples and schema ------------------------------------------------------------------------------------------
 
 
 @verb(

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 __all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]
 
 
-# ---- analyse ---------------------------------------------------------------------------------------------------------
-
-
 @verb(out=DATA, at=ONE_POSITION)
 def analyse(
     model: Model, files: Files, settled: Friction, steps: int = 360, at: str | None = None, uncut: bool = False,
@@ -135,8 +132,6 @@ def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":
     return _analysed(mechanism.with_friction("off"), steps).dataset
 
 
-# ---- simulate --------------------------------------------------------------------------------------------------------
-
 PERCENT = 100
 EVALUATIONS = 2_000_000  # as `simulate` has it
 
@@ -179,8 +174,6 @@ def simulate(
             end(unsteady.findings, model.file, "drivers")
     Shown(result, model, files, "drivers", drawn={"kind": kind}).finish()
 
-
-# ---- locking ---------------------------------------------------------------------------------------------------------
 
 MOST_RANGES = 24  # rows of the table of ranges
 

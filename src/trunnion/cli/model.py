@@ -56,8 +56,8 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
 
 
 def _show_structure(checked: "Check", drivers: int) -> None:
-    """Mobility, structural formula, modules with the ways to assemble them, and pairs of gears, a line each."""
-    from trunnion.views.assembly.modes import gear_line, lines
+    """Mobility, structural formula, and modules with the ways to assemble them, a line each."""
+    from trunnion.views.assembly.modes import lines
 
     rank = checked.rank_mobility
     by_rank = "by rank unknown: no position can be assembled" if rank is None else f"{rank} by rank"
@@ -71,8 +71,6 @@ def _show_structure(checked: "Check", drivers: int) -> None:
         for choice in (choice for choice in checked.choices if choice.module == number):
             for text in lines(choice):
                 line(f"    {text}")
-    for pair in checked.gears:
-        line(f"gears    {gear_line(pair)}")
 
 
 def _list(model: Model) -> None:

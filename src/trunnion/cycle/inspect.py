@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle.findings import Cycle, findings
 from trunnion.cycle.model_findings import shared_dimensions
 from trunnion.cycle.positions import positions
-from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import named
 from trunnion.measures.positions import ends_by_name
@@ -23,18 +21,7 @@ from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
 from trunnion.structure.decompose import Plan, mobility_by_rank
 
-__all__ = ["Check", "GearPair", "check"]
-
-
-class GearPair(NamedTuple):
-    """A gear pair with teeth: whether one gear turns inside the other, and the pitch radii by link, m.
-
-    Of a rack, chain or rope the one radius of its wheel.
-    """
-
-    name: str
-    internal: bool
-    radii: tuple[tuple[str, float], ...]
+__all__ = ["Check", "check"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +30,7 @@ class Check:
 
     rank_mobility: by the rank of the joints' constraints, None where no position can be assembled.
     assemblies: number found for each module; choices: the groups that have several, with their ways; findings:
-    everything to know, worst first; gears: the gear pairs with teeth.
+    everything to know, worst first.
     """
 
     plan: Plan
@@ -51,7 +38,6 @@ class Check:
     assemblies: tuple[int, ...]
     choices: tuple[GroupModes, ...]
     findings: tuple[Finding, ...]
-    gears: tuple[GearPair, ...] = ()
 
     @property
     def formula(self) -> str:
@@ -85,7 +71,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     notes += [*shared_dimensions(mechanism), *_unplaced(run)]
     order = list(Severity)
     notes.sort(key=lambda finding: order.index(finding.severity))
-    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(notes), _gears(run))
+    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(notes))
 
 
 def _unplaced(run: Run) -> Iterator[Finding]:
@@ -97,20 +83,6 @@ def _unplaced(run: Run) -> Iterator[Finding]:
             ends_by_name(run, [measure])
         except MechanismError as error:
             yield from (replace(finding, severity=Severity.WARNING) for finding in error.findings)
-
-
-def _gears(run: Run) -> tuple[GearPair, ...]:
-    gears = []
-    for name, gear in run.system.mechanism.gears.items():
-        if not gear.touches:
-            continue
-        circles = pitch_circles(run.system, run.values, name)
-        carriers = run.system.mechanism.carriers(name) or (0, 0)
-        sign = 1.0 if carriers[0] == carriers[1] else -1.0
-        radii = tuple((str(circle["at"]).rpartition(".")[0], float(circle["radius"])) for circle in circles)
-        internal = not gear.slides and sign * float(run.system.ratio(run.values, name)) > 0
-        gears.append(GearPair(name, internal, radii))
-    return tuple(gears)
 
 
 def _rank(walk: Forward) -> int | None:

@@ -1,4 +1,4 @@
-"""The ways in which a group can be assembled, and gear pairs, in lines of text as `check` prints them."""
+"""The ways in which a group can be assembled, in lines of text as `check` prints them."""
 
 from __future__ import annotations
 
@@ -11,25 +11,13 @@ from numpy.typing import NDArray
 from trunnion.results.quantities import prefixed
 
 if TYPE_CHECKING:
-    from trunnion.cycle.inspect import GearPair
     from trunnion.solve.assembly_modes import AssemblyMode, GroupModes
 
-__all__ = ["gear_line", "lines", "places", "some"]
+__all__ = ["lines", "places", "some"]
 
 MOST_JOINTS = 8  # named in a line
 MOST_WAYS = 24  # in lines
 EQUAL = 1e-7  # of the largest number: nearer ones are one
-
-
-def gear_line(pair: GearPair) -> str:
-    """'mesh: external, pitch radii 40 mm of crank, 80 mm of wheel', 'steering: pitch radius 8 mm of pinion'."""
-    parts = []
-    for link, radius in pair.radii:
-        factor, unit = prefixed(radius, "m")
-        parts.append(f"{radius * factor:.5g} {unit} of {link}")
-    if len(parts) == 1:
-        return f"{pair.name}: pitch radius {parts[0]}"
-    return f"{pair.name}: {'internal' if pair.internal else 'external'}, pitch radii {', '.join(parts)}"
 
 
 def lines(choice: GroupModes) -> list[str]:

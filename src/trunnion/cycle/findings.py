@@ -149,7 +149,8 @@ def _past_dead_centre(cycle: Cycle, places: NDArray[np.intp]) -> str | None:
 def _without_answer(cycle: Cycle) -> Iterator[Finding]:
     """Positions that are singular or close to it, that do not converge, or in which a load or a sense is undefined."""
     arrays, dial, causes = cycle.at.arrays, cycle.at.dial, cycle.at.causes
-    status, condition = arrays["status"], np.nan_to_num(arrays["condition"], nan=np.inf)
+    status = arrays["status"]
+    condition = np.where(np.isnan(arrays["condition"]), np.inf, arrays["condition"])
     for places, _ in causes.of("stuck").values():
         if len(places := places[status[places] == Status.ZERO_SLIP]):
             at = dial.intervals(places)

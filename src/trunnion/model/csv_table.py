@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.csv_text import cells_of, heading, numbered, separator_of, units_below
 from trunnion.model.expression import literal
@@ -25,7 +25,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.text import MOST_FILES, OF_A_FILE, in_folder, read_text, stated_files
 from trunnion.model.units import ANY, KINDS, NUMBER, Kind, UnitError, dimension_text, unit
 
-__all__ = ["TableFiles", "TablePoints", "column", "place_findings", "with_own_points", "with_points"]
+__all__ = ["TableFiles", "TablePoints", "column", "place_findings", "with_points"]
 
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
 
@@ -47,79 +47,67 @@ class TablePoints(NamedTuple):
     lines: list[int]
 
 
-def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, Any], list[TablePoints]]:
+def with_points(
+    data: Mapping[str, Any], files: TableFiles, model: Path | None = None
+) -> tuple[dict[str, Any], list[TablePoints]]:
     """Plain data of a model with the points of drivers and tables replaced by those of files.
 
-    A driver of another motion law becomes one of law `table`. MechanismError with every finding in every file.
-    """
-    changed, read = dict(data), []
-    findings: list[Finding] = []
-    for name, path in files.items():
-        try:
-            section, key = _holder(data, name)
-            points = _points(Path(path), f"{section}.{key}.points", _kinds(data, section, key))
-        except MechanismError as error:
-            findings += error.findings
-            continue
-        read.append(points)
-        _put(changed, section, key, points)
-    if findings:
-        raise MechanismError(findings)
-    return changed, read
-
-
-def _put(data: dict[str, Any], section: str, key: str, points: TablePoints) -> None:
-    """Points in place of those that a driver or table states, or of the file that it names."""
-    entry = data[section][key]
-    rest = {key: value for key, value in entry.items() if key not in OF_A_FILE} if isinstance(entry, Mapping) else {}
-    if section == "drivers" and rest.get("law") != "table":
-        rest = {"law": "table"}
-    data[section] = {**data[section], key: {**rest, "points": points.rows}}
-
-
-def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any], list[TablePoints]]:
-    """Plain data of a model file with the points from the files in its folder that drivers and tables name.
-
-    MechanismError with every finding: about a name where it stands in the model, about the content with file and line.
+    files: by name of a driver or table; a driver of another motion law becomes one of law `table`. model: the file of
+    the data, whose drivers and tables name files in its folder. MechanismError with every finding: about a name where
+    it stands in the model, about the content with file and line.
     """
     changed, read = dict(data), list[TablePoints]()
     findings: list[Finding] = []
-    size = 0
-    for count, (section, key, name) in enumerate(stated_files(data), start=1):
-        where, entry = f"{section}.{key}", data[section][key]
-        names = entry.get("columns")
+    own = [(f"{section}.{key}", file) for section, key, file in stated_files(data)] if model else []
+    for name, file in [*files.items(), *own[: MOST_FILES + 1]]:
         try:
-            if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
-                what, remedy = "is not the headers of two columns", "write two texts: columns: [time, pressure]"
-                raise MechanismError(Finding(what, f"{where}.columns", remedy))
-            if "points" in entry:
-                raise MechanismError(Finding("states both points and a file", where, "remove one of them"))
-            path = in_folder(model.resolve().parent, name, f"{where}.file")
-            size += path.stat().st_size
-            if count > MOST_FILES or size > MAX_BYTES or sum(len(points.rows) for points in read) > MAX_OWN_ROWS:
-                what = f"the files that the model names are too many or too long: more than {MOST_FILES} files, over "
-                what += f"{MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
-                findings.append(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))
-                break
-            points = _points(path, f"{where}.points", _kinds(data, section, key), str(model.parent / name), names)
+            section, key = _holder(data, name)
+            path, label, columns = Path(file), str(file), None
+            if model and name not in files:
+                path, columns = _own_file(data[section][key], f"{section}.{key}", model, read, len(own))
+                label = str(model.parent / file)
+            points = _points(path, f"{section}.{key}.points", _kinds(data, section, key), label, columns)
         except MechanismError as error:
             findings += error.findings
             continue
         read.append(points)
-        _put(changed, section, key, points)
+        entry = changed[section][key]
+        rest = {k: value for k, value in entry.items() if k not in OF_A_FILE} if isinstance(entry, Mapping) else {}
+        if section == "drivers" and rest.get("law") != "table":
+            rest = {"law": "table"}
+        changed[section] = {**changed[section], key: {**rest, "points": points.rows}}
     if findings:
         raise MechanismError(findings)
     return changed, read
+
+
+def _own_file(
+    entry: Mapping[str, Any], where: str, model: Path, read: Sequence[TablePoints], count: int
+) -> tuple[Path, Sequence[str] | None]:
+    """The file that an entry names, and the headers of its columns. read, count: of all that the model names."""
+    names = entry.get("columns")
+    if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
+        what, remedy = "is not the headers of two columns", "write two texts: columns: [time, pressure]"
+        raise MechanismError(Finding(what, f"{where}.columns", remedy))
+    if "points" in entry:
+        raise MechanismError(Finding("states both points and a file", where))
+    path = in_folder(model.resolve().parent, entry["file"], f"{where}.file")
+    size = path.stat().st_size + sum(Path(points.file).stat().st_size for points in read)
+    if count > MOST_FILES or size > MAX_BYTES or sum(len(points.rows) for points in read) > MAX_OWN_ROWS:
+        what = f"the files that the model names are too many or too long: more than {MOST_FILES} files, over "
+        what += f"{MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
+        raise MechanismError(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))
+    return path, names
 
 
 def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> list[Finding]:
     """The findings, those about points with the file and line that these came from and a few for each file."""
     placed = list(findings)
     for points in read:
-        of_points = [finding for finding in findings if f"{finding.where}.".startswith(f"{points.where}.")]
+        of_points = [finding for finding in placed if f"{finding.where}.".startswith(f"{points.where}.")]
+        placed = [finding for finding in placed if finding not in of_points]
         indices = [finding.where[len(points.where) + 1 :].partition(".")[0] for finding in of_points]
         lines = [points.lines[int(index) if index.isdecimal() else 0] for index in indices]
-        placed = [finding for finding in placed if not f"{finding.where}.".startswith(f"{points.where}.")]
         placed += _few([finding.at(points.file, line) for finding, line in zip(of_points, lines, strict=True)])
     return placed
 
@@ -128,7 +116,7 @@ def _few(findings: list[Finding]) -> list[Finding]:
     """The first few findings, and how many more there are."""
     if len(findings) <= SHOWN:
         return findings
-    more = Finding(f"and {len(findings) - SHOWN} more like these", findings[0].where, "correct those above first")
+    more = Finding(f"and {len(findings) - SHOWN} more like these", findings[0].where)
     return [*findings[:SHOWN], more.at(findings[0].file, findings[SHOWN].line)]
 
 
@@ -137,9 +125,8 @@ def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
     parts = {section: part for section in ("drivers", "tables") if isinstance(part := data.get(section), Mapping)}
     holders = [(section, key) for section in parts for key in parts[section] if name in (key, f"{section}.{key}")]
     if len(holders) == 2:
-        raise MechanismError(
-            Finding(f"'{name}' is a driver and a table", remedy=f"say drivers.{name} or tables.{name}")
-        )
+        what, remedy = f"'{name}' is a driver and a table", f"say drivers.{name} or tables.{name}"
+        raise MechanismError(Finding(what, remedy=remedy))
     if not holders:
         remedy = nearest(name, [key for part in parts.values() for key in part])
         raise MechanismError(Finding(f"there is no driver or table '{name}'", remedy=remedy))
@@ -153,8 +140,7 @@ def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]
     joint = key if section == "drivers" else next(iter(drivers), "") if isinstance(drivers, Mapping) else ""
     stated = joints.get(joint) if isinstance(joints, Mapping) else None
     pair = PAIRS.get(str(stated.get("type"))) if isinstance(stated, Mapping) else None
-    either = KINDS["angle"] | KINDS["length"]
-    coordinate = either if pair is None else KINDS["angle" if pair.turns else "length"]
+    coordinate = KINDS["angle"] | KINDS["length"] if pair is None else KINDS["angle" if pair.turns else "length"]
     return KINDS["time"] if in_time else coordinate, coordinate if section == "drivers" else ANY
 
 
@@ -162,13 +148,13 @@ def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]
 
 
 def _points(
-    path: Path, where: str, kinds: tuple[Kind, Kind], label: str = "", names: Sequence[str] | None = None
+    path: Path, where: str, kinds: tuple[Kind, Kind], label: str, names: Sequence[str] | None = None
 ) -> TablePoints:
     """The points of a file; MechanismError with file and line of every finding, a few of each file.
 
     label: what the file is called in findings; names: the headers of the two columns, of a file that has more.
     """
-    units, rows = _columns(path, kinds, label or str(path), names)
+    units, rows = _columns(path, kinds, label, names)
     if names:  # of another program, which writes numbers of SI without their unit
         plain = (KINDS["time"], KINDS["angle"], KINDS["length"])
         units = [text or kind.unit * (kind in plain) for text, kind in zip(units, kinds, strict=True)]
@@ -176,7 +162,7 @@ def _points(
         [f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)]
         for _, cells in rows
     ]
-    return TablePoints(where, label or str(path), points, [line for line, _ in rows])
+    return TablePoints(where, label, points, [line for line, _ in rows])
 
 
 def column(path: Path, kind: Kind) -> list[float]:
@@ -188,23 +174,28 @@ def column(path: Path, kind: Kind) -> list[float]:
     return [literal(cells[0], units[0]).value for _, cells in rows]
 
 
-# by the number of columns: what a file is, of what it has a row, an example of one, and what to do about too many
-_TABLE = ("table", "a row for each point", "0; 12.5", "use fewer points: values between them are interpolated")
-_SAMPLE = ("sample", "a deviation in each line", "0.012", "use a random subset")
+# by the number of columns: what a file is, of what it has a row, an example of one, and what is of another number
+_FILES = {
+    1: ("sample", "a deviation in each line", "0.012", "a table of two columns is given by --table"),
+    2: ("table", "a row for each point", "0; 12.5",
+        "write time or drive coordinate, then value, and between them a comma, or beside decimal commas ; or a tab; of "
+        "more columns name two: columns: [time, pressure]"),
+}  # fmt: skip
 
 
 def _columns(
     path: Path, kinds: Sequence[Kind], label: str, names: Sequence[str] | None = None
 ) -> tuple[list[str], list[Row]]:
     """The units of one or two columns, and their rows of plain numbers; MechanismError as `_points`."""
-    noun, each, example, fewer = _TABLE if len(kinds) == 2 else _SAMPLE
+    noun, each, example, columns = _FILES[len(kinds)]
     try:
         text = read_text(path, f"a {noun}", MAX_BYTES, f"write {each}, such as {example}")
         lines = numbered(io.StringIO(text, newline=None))
         if not lines:
             raise MechanismError(Finding("has only comments", remedy=f"write {each}", line=1))
         if len(lines) > MAX_ROWS + 1:
-            raise MechanismError(Finding(f"has {len(lines)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
+            what = f"has {len(lines)} rows, a {noun} at most {MAX_ROWS}"
+            raise MechanismError(Finding(what, remedy="use fewer points, or a random subset"))
         separator = separator_of(lines[0][1], "," if len(kinds) == 2 else ";")
         rows = [(number, _cells(line, separator)) for number, line in lines]
         heads, units = list[str](), [""] * len(rows[0][1])
@@ -216,8 +207,8 @@ def _columns(
         if names:
             units, rows = _named_columns(rows, heads, units, names)
         if len(units) != len(kinds):
-            what = f"has {len(units)} column{'s' * (len(units) > 1)}, a {noun} has {len(kinds)}"
-            raise MechanismError(Finding(what, remedy=_OTHER_COLUMNS[len(kinds)], line=rows[0][0]))
+            what = f"has {counted(len(units), 'column')}, a {noun} has {len(kinds)}"
+            raise MechanismError(Finding(what, remedy=columns, line=rows[0][0]))
         _check_units(rows[0], units, kinds)
         numbers = rows[1:] if heads else rows
         if len(numbers) < 2:
@@ -228,13 +219,6 @@ def _columns(
     except MechanismError as error:
         raise MechanismError([finding.at(label, finding.line) for finding in error.findings]) from None
     return units, [(line, [_number(cell, separator) for cell in cells]) for line, cells in numbers]
-
-
-_OTHER_COLUMNS = {
-    1: "keep the column of the deviations; a table of two columns is given by --table",
-    2: "write time or drive coordinate, then value, and between them a comma, or beside decimal commas ; or a tab; of "
-    "more columns name two: columns: [time, pressure]",
-}
 
 
 def _named_columns(
@@ -255,10 +239,9 @@ def _named_columns(
             remedy = nearest(name, heads) if not fitting else "give each column a name of its own"
             findings.append(Finding(what, remedy=remedy, line=line))
         places += fitting[:1]
-    findings += [
-        Finding(f"has {len(cells)} cells, the header has {len(header)}", remedy=_OTHER_COLUMNS[2], line=number)
-        for number, cells in rows[1:] if len(cells) > len(header)
-    ]  # fmt: skip
+    for number, cells in rows[1:]:
+        if len(cells) > len(header):
+            findings.append(Finding(f"has {len(cells)} cells, the header has {len(header)}", line=number))
     if findings:
         raise MechanismError(_few(findings))
     picked = [(number, [cells[i] if i < len(cells) else "" for i in places]) for number, cells in rows]
@@ -284,13 +267,11 @@ def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> Iterator[F
     """What is no pair of numbers, or no number in a single column."""
     for line, cells in rows:
         if len(cells) != columns:
-            what = f"has {len(cells)} cell{'s' * (len(cells) > 1)}, the rows before have {columns}"
-            yield Finding(what, remedy="write as many numbers", line=line)
+            yield Finding(f"has {counted(len(cells), 'cell')}, the rows before have {columns}", line=line)
             continue
-        for cell in cells:
-            if not _number(cell, separator):
-                what = f"'{cell[:40]}' is not a finite number" if cell else "a number is missing"
-                yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
+        for cell in (cell for cell in cells if not _number(cell, separator)):
+            what = f"'{cell[:40]}' is not a finite number" if cell else "a number is missing"
+            yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
 
 
 def _check_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> None:

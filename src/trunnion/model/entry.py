@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
-from typing import Annotated, Any, NoReturn, Self, TypeVar
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, NoReturn, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from trunnion.model.names import FORMULA, nearest
 from trunnion.model.quantity import Dimensionless, Length
 from trunnion.model.rules import Directed
 
-__all__ = ["FORMS", "Direction", "Name", "Part", "Position", "ReadOnlyDict", "forms", "known", "problem", "shape"]
+__all__ = [
+    "FORMS", "Direction", "Name", "OneOf", "Part", "Position", "ReadOnlyDict", "ShortForm", "forms", "problem", "shape",
+]  # fmt: skip
 
 
 K = TypeVar("K")
@@ -38,15 +53,26 @@ def problem(what: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("stated", "{what}", {"what": what, "remedy": remedy})
 
 
-def known(table: tuple[str, ...], noun: str) -> Any:
-    """Annotations of a text that must be an entry of a table, for validation and JSON Schema."""
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """A text that is an entry of a table, for validation and JSON Schema; the noun is of the entries."""
 
-    def check(value: str) -> str:
-        if value not in table:
-            raise problem(f"'{value[:80]}' is not a {noun}", nearest(value, table))
-        return value
+    table: Collection[str]
+    noun: str
 
-    return AfterValidator(check), WithJsonSchema({"type": "string", "enum": list(table)})
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The text, if the table has it."""
+
+        def check(value: str) -> str:
+            if value not in self.table:
+                raise problem(f"'{value[:80]}' is not a {self.noun}", nearest(value, self.table))
+            return value
+
+        return core_schema.no_info_after_validator_function(check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The entries."""
+        return {"type": "string", "enum": list(self.table)}
 
 
 FORMS = (":group", ":list", ":value", ":way")  # tags of the forms an entry may have
@@ -112,3 +138,29 @@ class Part(BaseModel):
     def _freeze(self) -> Self:
         self.__dict__.update({key: _read_only(value) for key, value in vars(self).items() if isinstance(value, dict)})
         return self
+
+
+class ShortForm(Part):
+    """An entry that may be written as the value of one of its keys alone, if it states no other."""
+
+    short_key: ClassVar[str]
+    short_types: ClassVar[tuple[type, ...]]  # of a value that is not the group
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The value or the group."""
+        group = handler.resolve_ref_schema(handler(schema))
+        stated = group["properties"][cls.short_key]
+        value = next(form for form in stated.get("anyOf", [stated]) if form.get("type") != "null")
+        return {"anyOf": [value, group], "description": group.pop("description")}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_value(cls, value: object) -> object:
+        return {cls.short_key: value} if isinstance(value, cls.short_types) else value
+
+    @model_serializer(mode="wrap")
+    def _write_value(self, write: SerializerFunctionWrapHandler) -> Any:
+        long = write(self)
+        stated = [key for key, value in long.items() if value is not None]
+        return long[self.short_key] if stated == [self.short_key] else long

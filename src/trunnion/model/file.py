@@ -24,7 +24,7 @@ from ruamel.yaml.parser import Parser
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.csv_table import TableFiles, place_findings, with_own_points, with_points
+from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.text import read_text
 
 __all__ = [
@@ -58,7 +58,7 @@ def read_model(
     findings = [version_finding.at(str(path), 1) for version_finding in version_findings(data)]
     data, read = with_points(data, tables or {})
     try:
-        data, own_points = with_own_points(data, path)
+        data, own_points = with_points(data, {}, path)
         read += own_points
         model = build(data)
     except MechanismError as error:

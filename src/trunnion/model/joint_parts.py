@@ -13,10 +13,8 @@ from pydantic import (
     GetJsonSchemaHandler,
     PlainSerializer,
     PlainValidator,
-    SerializerFunctionWrapHandler,
     Tag,
     WithJsonSchema,
-    model_serializer,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -27,7 +25,7 @@ from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.contact import CONTACT_LAWS, ContactLaw
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.entry import Direction, Name, Part, ReadOnlyDict, forms, known, problem
+from trunnion.model.entry import Direction, Name, OneOf, Part, ReadOnlyDict, ShortForm, forms, problem
 from trunnion.model.expression import DIAMETER
 from trunnion.model.quantity import (
     Angle,
@@ -80,12 +78,7 @@ def freedoms(joint_type: str) -> tuple[str, ...]:
     return PAIRS[joint_type].freedoms
 
 
-_check_type, _schema_type = known(JOINT_TYPES, "joint type")
-_check_law, _schema_law = known(tuple(FRICTION_LAWS), "friction law")
-_check_contact, _schema_contact = known(tuple(CONTACT_LAWS), "contact law")
-_check_model, _schema_model = known(FRICTION_MODELS, "friction model")
-
-JointType = Annotated[str, _check_type, _schema_type]
+JointType = Annotated[str, OneOf(JOINT_TYPES, "joint type")]
 Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
@@ -193,7 +186,7 @@ class Contact(Part):
     the pin if not stated); exponent: n. With law: rigid the restitution alone.
     """
 
-    law: Annotated[str, _check_contact, _schema_contact, LAW] = "restitution"
+    law: Annotated[str, OneOf(CONTACT_LAWS, "contact law"), LAW] = "restitution"
     restitution: Annotated[Dimensionless | None, Within(0, 1)] = None
     stiffness: Annotated[AnyQuantity | None, Positive] = None
     exponent: Annotated[Dimensionless | None, Within(1, 10)] = None
@@ -263,14 +256,15 @@ class Misalignment(Part):
         return self.model_copy(update={key: Quantity(0, KINDS[zeros[key]]) for key in missing})
 
 
-class Friction(Part):
+class Friction(ShortForm):
     """Friction of a joint: a law with its parameters, or one number, the coefficient (law: coulomb)."""
 
+    short_key, short_types = "coefficient", (int, float, str, Quantity)
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, AnyQuantity]
 
-    law: Annotated[str, _check_law, _schema_law] | None = None
-    model: Annotated[str, _check_model, _schema_model] | None = None
+    law: Annotated[str, OneOf(FRICTION_LAWS, "friction law")] | None = None
+    model: Annotated[str, OneOf(FRICTION_MODELS, "friction model")] | None = None
 
     @property
     def parameters(self) -> Mapping[str, Quantity]:
@@ -288,16 +282,6 @@ class Friction(Part):
             group["properties"][key] = {"type": number, "description": f"{parameter.meaning}{unit}"}
         group["additionalProperties"] = False
         return {"anyOf": [{"type": number}, group], "description": group.pop("description")}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_number(cls, value: object) -> object:
-        return {"coefficient": value} if isinstance(value, (int, float, str, Quantity)) else value
-
-    @model_serializer(mode="wrap")
-    def _write_number(self, write: SerializerFunctionWrapHandler) -> Any:
-        long = write(self)
-        return long["coefficient"] if list(long) == ["coefficient"] else long
 
 
 class Losses(Part):

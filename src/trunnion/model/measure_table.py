@@ -30,10 +30,10 @@ __all__ = [
 class MeasureKind:
     """One kind of measure.
 
-    text: of its key in the file; long_name: for tables; quantity: what the course is, or both that it may be, where
-    the joint, driver, load or spring turns and where it slides. of: what the key names (see `checks.measures`), or the
-    words that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is solved;
-    `simulation`: it is of the motion in time of a free driver and has no course over a cycle.
+    long_name: for tables; note: what else there is to say of it; quantity: what the course is, or both that it may be,
+    where the joint, driver, load or spring turns and where it slides. of: what the key names (see `checks.measures`),
+    or the words that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is
+    solved; `simulation`: it is of the motion in time of a free driver and has no course over a cycle.
     rule: what makes the figure of the course if no statistic is stated, an entry of `measures.figures.RULES`;
     reduced: it is one number of a whole range already. against: whether the course is taken less that of the nominal
     mechanism, position by position. vector: whether `axis` or `along` picks one component: it `must` or `may`; in
@@ -41,7 +41,6 @@ class MeasureKind:
     for; what is not met up to there is ∞.
     """
 
-    text: str
     long_name: str
     quantity: Kind | tuple[Kind, Kind]
     of: str | tuple[str, ...]
@@ -52,6 +51,13 @@ class MeasureKind:
     vector: Literal["", "must", "may", "must in space", "may in space"] = ""
     space: str = ""
     up_to: float = inf
+    note: str = ""
+
+    @property
+    def text(self) -> str:
+        """Of its key in the file."""
+        of = self.of if isinstance(self.of, str) else " or ".join(f"`{word}`" for word in self.of)
+        return f"{of.removeprefix('any ')}: {self.long_name}{', ' * bool(self.note)}{self.note}"
 
     @property
     def quantities(self) -> tuple[Kind, ...]:
@@ -93,137 +99,90 @@ def _of_results(name: str, si: str, *powers: int) -> Kind:
 SPIN_RATE = _of_results("angular acceleration", "rad/s^2", 0, 0, -2, 1)
 POWER, ENERGY = _of_results("power", "W", 2, 1, -3, 0), _of_results("energy", "J", 2, 1, -2, 0)
 
+COMPONENT = "its magnitude or, with `axis` or `along`, a component"
+
 # in the order of the file's keys
 MEASURES: dict[str, MeasureKind] = {
-    "point": MeasureKind(
-        "link.point whose coordinate is watched", "coordinate of a point", LENGTH, "point", vector="must"
-    ),
+    "point": MeasureKind("coordinate of a point", LENGTH, "point", vector="must"),
     "path_error": MeasureKind(
-        "link.point whose distance from its nominal place is watched", "distance of a point from its nominal place",
-        LENGTH, "point", rule="maximum", against=True,
-    ),
+        "distance of a point from its nominal place", LENGTH, "point", rule="maximum", against=True),
     "straightness": MeasureKind(
-        "link.point whose path is watched, how far it is from a straight line", "straightness of the path of a point",
-        LENGTH, "point", rule="line", reduced=True,
-    ),
+        "straightness of the path of a point", LENGTH, "point", rule="line", reduced=True,
+        note="how far it is from a straight line"),
     "angle": MeasureKind(
-        "link whose angle is measured; in space its rotation about a global axis, relative to the ideal mechanism",
         "angle of a link", ANGLE, "link", vector="must in space",
-    ),
-    "rotation": MeasureKind(
-        "joint whose rotation is watched, second link against first", "rotation of a joint", ANGLE, "joint"
-    ),
-    "slide": MeasureKind("joint whose slide is watched", "slide of a joint", LENGTH, "joint"),
+        note="in space its rotation about a global axis, relative to the ideal mechanism"),
+    "rotation": MeasureKind("rotation of a joint", ANGLE, "joint", note="second link against first"),
+    "slide": MeasureKind("slide of a joint", LENGTH, "joint"),
     "transmission_error": MeasureKind(
-        "joint whose motion is watched, less the nominal one", "transmission error of a joint", MOTION, "joint",
-        against=True,
-    ),
+        "transmission error of a joint", MOTION, "joint", against=True, note="its motion less the nominal one"),
     "stroke": MeasureKind(
-        "joint whose stroke is watched, from end to end of its motion", "stroke of a joint", MOTION, "joint",
-        rule="peak-to-peak", reduced=True,
-    ),
+        "stroke of a joint", MOTION, "joint", rule="peak-to-peak", reduced=True, note="from end to end of its motion"),
     "dead_centre": MeasureKind(
-        "joint whose dead centre is watched, as the coordinate of the first driver at which its own is largest; with "
-        "`as` place-of-minimum, smallest", "dead centre of a joint", MOTION, "joint", rule="dead centre", reduced=True,
-    ),
+        "dead centre of a joint", MOTION, "joint", rule="dead centre", reduced=True,
+        note="the coordinate of the first driver at which its own is largest; with `as` place-of-minimum, smallest"),
     "time_ratio": MeasureKind(
-        "joint whose time ratio is watched: of its ways forth and back the longer over the shorter, by the coordinate "
-        "of the first driver", "time ratio of a joint", MOTION, "joint", rule="time ratio",
-        reduced=True,
-    ),
+        "time ratio of a joint", MOTION, "joint", rule="time ratio", reduced=True,
+        note="of its ways forth and back the longer over the shorter, by the coordinate of the first driver"),
     "rate": MeasureKind(
-        "joint whose speed is watched: of its rotation, of a prismatic one of its slide", "speed of a joint", RATE,
-        "joint", "motion",
-    ),
+        "speed of a joint", RATE, "joint", "motion", note="of its rotation, of a prismatic one its slide"),
     "joint_acceleration": MeasureKind(
-        "joint whose acceleration is watched: of its rotation, of a prismatic one of its slide",
         "acceleration of a joint", (SPIN_RATE, ACCELERATION), "joint", "motion",
-    ),
-    "velocity": MeasureKind(
-        "link.point whose velocity is watched, its magnitude or, with `axis` or `along`, a component",
-        "velocity of a point", SPEED, "point", "motion", vector="may",
-    ),
+        note="of its rotation, of a prismatic one its slide"),
+    "velocity": MeasureKind("velocity of a point", SPEED, "point", "motion", vector="may", note=COMPONENT),
     "acceleration": MeasureKind(
-        "link.point whose acceleration is watched, its magnitude or, with `axis` or `along`, a component",
-        "acceleration of a point", ACCELERATION, "point", "motion", vector="may",
-    ),
+        "acceleration of a point", ACCELERATION, "point", "motion", vector="may", note=COMPONENT),
     "angular_velocity": MeasureKind(
-        "link whose angular velocity is watched; in space its magnitude or, with `axis` or `along`, a component",
-        "angular velocity of a link", SPIN, "link", "motion", vector="may in space",
-    ),
+        "angular velocity of a link", SPIN, "link", "motion", vector="may in space", note=f"in space {COMPONENT}"),
     "angular_acceleration": MeasureKind(
-        "link whose angular acceleration is watched; in space its magnitude or, with `axis` or `along`, a component",
         "angular acceleration of a link", SPIN_RATE, "link", "motion", vector="may in space",
-    ),
+        note=f"in space {COMPONENT}"),
     "transmission_angle": MeasureKind(
-        "joint of a dyad whose transmission angle is watched, from 0, where it locks, to 90 deg, where it drives best; "
-        "in the plane", "transmission angle at a joint", ANGLE, "any joint", space="planar",
-    ),
+        "transmission angle at a joint", ANGLE, "any joint", space="planar",
+        note="of a dyad, in the plane; from 0, where it locks, to 90 deg, where it drives best"),
     "pressure_angle": MeasureKind(
-        "joint of a dyad whose pressure angle is watched, from -90 to 90 deg, 0 being best; in the plane",
         "pressure angle at a joint", ANGLE, "any joint", space="planar",
-    ),
-    "effort": MeasureKind("driver whose effort is watched", "effort of a driver", EFFORT, "driver", "forces"),
+        note="of a dyad, in the plane; from -90 to 90 deg, 0 being best"),
+    "effort": MeasureKind("effort of a driver", EFFORT, "driver", "forces"),
     "load": MeasureKind(
-        "load on a joint, whose torque or force against the joint's positive sense is watched",
         "torque or force of a load on a joint", EFFORT, "load on a joint", "forces",
-    ),
+        note="against the joint's positive sense"),
     "spring_force": MeasureKind(
-        "spring whose pull is watched, negative where it pushes; in a joint that turns its torque",
-        "force or torque of a spring", EFFORT, "spring", "motion",
-    ),
+        "force or torque of a spring", EFFORT, "spring", "motion", note="its pull, negative where it pushes"),
     "spring_elongation": MeasureKind(
-        "spring, how far it is beyond its free length or angle", "elongation of a spring", MOTION, "spring", "motion",
-    ),
-    "reaction": MeasureKind(
-        "joint whose reaction is watched, its magnitude or, with `axis` or `along`, a component",
-        "reaction in a joint", FORCE, "any joint", "forces", vector="may",
-    ),
+        "elongation of a spring", MOTION, "spring", "motion", note="beyond its free length or angle"),
+    "reaction": MeasureKind("reaction in a joint", FORCE, "any joint", "forces", vector="may", note=COMPONENT),
     "end_load": MeasureKind(
-        "joint with a bearing or guide length, the larger load on its two ends; of a universal joint on those of both "
-        "pins", "load on an end of a bearing", FORCE, "any joint", "forces",
-    ),
+        "load on an end of a bearing", FORCE, "any joint", "forces",
+        note="the larger of the two ends of a joint with a bearing or guide length; of a universal joint of both pins"),
     "power": MeasureKind(
-        "driver or load whose power is measured, positive into the mechanism",
-        "power of a driver or load", POWER, "driver or load", "forces",
-    ),
-    "friction_power": MeasureKind(
-        "joint whose friction is watched, as the power lost to it", "power lost to friction in a joint", POWER,
-        "any joint", "forces",
-    ),
+        "power of a driver or load", POWER, "driver or load", "forces", note="positive into the mechanism"),
+    "friction_power": MeasureKind("power lost to friction in a joint", POWER, "any joint", "forces"),
     "friction_energy": MeasureKind(
-        "joint whose friction is watched, as the energy lost to it over the cycle or range",
         "energy lost to friction in a joint", ENERGY, "any joint", "forces", rule="work", reduced=True,
-    ),
+        note="over the cycle or range"),
     "efficiency": MeasureKind(
-        "that of the whole `cycle`, or at each `instant`", "efficiency", NUMBER, ("cycle", "instant"), "forces",
-        rule="ratio",
-    ),
+        "efficiency", NUMBER, ("cycle", "instant"), "forces", rule="ratio",
+        note="that of the whole `cycle`, or at each `instant`"),
     "locking_margin": MeasureKind(
-        "of the `mechanism`: the multiple of its friction at which it locks", "locking margin", NUMBER,
-        ("mechanism",), "forces", rule="minimum", up_to=10.0,
-    ),
+        "locking margin", NUMBER, ("mechanism",), "forces", rule="minimum", up_to=10.0,
+        note="of the `mechanism`: the multiple of its friction at which it locks"),
     "starting_time": MeasureKind(
-        "free driver whose starting time is measured: when the mean speed of a turn is 95 % of the steady one",
         "starting time of a driver", KINDS["time"], "free driver", "simulation", rule="value", reduced=True,
-    ),
+        note="when the mean speed of a turn is 95 % of the steady one"),
     "steady_speed": MeasureKind(
-        "free driver whose steady speed is measured, the mean of its last turn", "steady speed of a driver", SPIN,
-        "free driver", "simulation", rule="value", reduced=True,
-    ),
+        "steady speed of a driver", SPIN, "free driver", "simulation", rule="value", reduced=True,
+        note="the mean of its last turn"),
     "fluctuation": MeasureKind(
-        "free driver whose coefficient of fluctuation is measured, (largest − smallest speed)/mean of its last turn",
         "coefficient of fluctuation of a driver", NUMBER, "free driver", "simulation", rule="value", reduced=True,
-    ),
+        note="(largest − smallest speed)/mean of its last turn"),
     "expression": MeasureKind(
-        "expression of other measures of the model, of dimensions and of columns of a result, by their names, such as "
-        "output - input, D.rotation - O.rotation or atan2(top.Q.y - low.P.y, AB)",
         "expression of measures", NUMBER, "expression",
-    ),
+        note="of other measures of the model, of dimensions and of columns of a result, by their names, such as "
+        "output - input, D.rotation - O.rotation or atan2(top.Q.y - low.P.y, AB)"),
     "peak_effort": MeasureKind(
-        "free driver whose largest effort in its motion in time is measured, its magnitude",
         "largest effort of a driver in time", EFFORT, "free driver", "simulation", rule="value", reduced=True,
-    ),
+        note="its magnitude"),
 }  # fmt: skip
 
 

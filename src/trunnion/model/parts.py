@@ -9,24 +9,18 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import (
     Discriminator,
     Field,
-    GetJsonSchemaHandler,
     PrivateAttr,
-    SerializerFunctionWrapHandler,
     Tag,
-    model_serializer,
-    model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.joints.motors import MOTORS, MotorKind
-from trunnion.model.entry import Direction, Name, Part, Position, forms, known, shape
+from trunnion.model.entry import Direction, Name, OneOf, Part, Position, ShortForm, forms, shape
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,
@@ -66,32 +60,15 @@ __all__ = [
     "Table",
 ]
 
-_check_motion, _schema_motion = known(tuple(MOTION_LAWS), "motion law")
-_check_motor, _schema_motor = known(tuple(MOTORS), "kind of motor")
 
-
-class Point(Part):
+class Point(ShortForm):
     """A point of a link in the link's frame: `[x, y]`, or with the axis of a sliding or spatial joint there."""
+
+    short_key, short_types = "at", (list, tuple)
 
     at: Annotated[Position, InSpace()]
     axis: Annotated[Direction | None, InSpace()] = None
     x: Annotated[Direction | None, InSpace()] = None
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The list or the group."""
-        group = handler.resolve_ref_schema(handler(schema))
-        return {"anyOf": [group["properties"]["at"], group], "description": group.pop("description")}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_list(cls, value: object) -> object:
-        return {"at": value} if isinstance(value, (list, tuple)) else value
-
-    @model_serializer(mode="wrap")
-    def _write_list(self, write: SerializerFunctionWrapHandler) -> Any:
-        long = write(self)
-        return long["at"] if self.axis is None and self.x is None else long
 
 
 class PolarPoint(Part):
@@ -152,7 +129,7 @@ class Motor(Part):
     side; it is engaged from the time clutch_from to clutch_until.
     """
 
-    kind: Annotated[str, _check_motor, _schema_motor, Selects("motor", MOTORS, _OF_ALL_MOTORS)]
+    kind: Annotated[str, OneOf(MOTORS, "kind of motor"), Selects("motor", MOTORS, _OF_ALL_MOTORS)]
     effort: ForceOrMoment | None = None
     stall_effort: ForceOrMoment | None = None
     no_load_speed: Annotated[Rate | None, NotZero("the motor has no speed")] = None
@@ -202,7 +179,7 @@ class Driver(Part):
     With `free: true` or a motor, motion in time finds it; all other analyses prescribe it as stated.
     """
 
-    law: Annotated[str, _check_motion, _schema_motion, _LAW] = "constant"
+    law: Annotated[str, OneOf(MOTION_LAWS, "motion law"), _LAW] = "constant"
     moves: Annotated[
         str | None,
         Refers("joint"),

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import (
     BeforeValidator,
     Field,
-    GetJsonSchemaHandler,
-    SerializerFunctionWrapHandler,
     WithJsonSchema,
-    model_serializer,
-    model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from trunnion.joints.fits import GRADES
-from trunnion.model.entry import Name, Part, known, problem
+from trunnion.model.entry import Name, OneOf, Part, ShortForm, problem
 from trunnion.model.limits import Limits, LimitText
 from trunnion.model.quantity import AnyQuantity, Dimensionless
 from trunnion.model.rules import NotNegative, Positive, Refers, Selects, Within
@@ -49,15 +43,16 @@ DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
 }
 OPTIONS = ("cp", "cpk", "shift", "mode", "alpha", "beta", "values")  # keys of a Variation that a distribution may take
 
-_check_distribution, _schema_distribution = known(tuple(DISTRIBUTIONS), "distribution")
-DistributionName = Annotated[str, _check_distribution, _schema_distribution]
+DistributionName = Annotated[str, OneOf(DISTRIBUTIONS, "distribution")]
 
 
-class Variation(Part):
+class Variation(ShortForm):
     """How a number varies about its nominal value: limits of its deviation, and how it is distributed within.
 
     Limits alone may be written without the group.
     """
+
+    short_key, short_types = "limits", (int, float, str, Limits)
 
     limits: LimitText | None = None
     distribution: DistributionName | None = None
@@ -69,23 +64,6 @@ class Variation(Part):
     beta: Annotated[Dimensionless | None, Positive] = None
     values: Annotated[tuple[AnyQuantity, ...], Field(min_length=2)] | None = None
     direction: Literal["uniform"] | None = None
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The limits or the group."""
-        group = handler.resolve_ref_schema(handler(schema))
-        limits = next(form for form in group["properties"]["limits"]["anyOf"] if form.get("type") != "null")
-        return {"anyOf": [limits, group], "description": group.pop("description")}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_limits(cls, value: object) -> object:
-        return {"limits": value} if isinstance(value, (int, float, str, Limits)) else value
-
-    @model_serializer(mode="wrap")
-    def _write_limits(self, write: SerializerFunctionWrapHandler) -> Any:
-        long = write(self)
-        return long["limits"] if self.model_fields_set == {"limits"} and self.limits is not None else long
 
 
 class VariationDefaults(Part):
@@ -117,8 +95,6 @@ class FormulaKeys(NamedTuple):
 
 COST_MODELS = {"power": FormulaKeys(), "exponential": FormulaKeys()}
 
-_check_model, _schema_model = known(tuple(COST_MODELS), "cost model")
-
 
 def _grade(value: object) -> object:
     """A grade as its number in a text: 7, "7" and "IT7" are "7"."""
@@ -149,7 +125,7 @@ class Cost(Part):
     among the IT grades of a process; and `options`, a choice among ways to make it.
     """
 
-    model: Annotated[str, _check_model, _schema_model, _FORMULA] | None = None
+    model: Annotated[str, OneOf(COST_MODELS, "cost model"), _FORMULA] | None = None
     A: Dimensionless | None = None
     B: Annotated[Dimensionless | None, NotNegative] = None
     k: Annotated[Dimensionless | None, Positive] = None

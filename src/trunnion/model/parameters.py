@@ -92,22 +92,18 @@ def entries(mechanism: Fields) -> list[Entry]:
 
     Last come the deviations that the model states of them; those whose name means no number are left out.
     """
-    numbers = list(_numbers(mechanism))
+    numbers = {entry.path: entry for entry in _numbers(mechanism)}
     if not mechanism.errors:
-        return numbers
-    names = ParameterNames(entry.path for entry in numbers)
-    kinds = {entry.path: entry.kind for entry in numbers}
-    measured = dimension_kinds(mechanism)
+        return [*numbers.values()]
+    names, dimensions = ParameterNames(numbers), dimension_kinds(mechanism)
     errors: dict[str, Entry] = {}
     for name, quantity in mechanism.errors.items():
         with suppress(MechanismError):  # a finding of its own
             path = names.resolve(name)
-            kind = measured.get(path.removeprefix("dimensions."), kinds[path])
+            kind = dimensions.get(path.removeprefix("dimensions."), numbers[path].kind)
             errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kind)
-    shifted = [
-        replace(number, error=errors[number.path].path) if number.path in errors else number for number in numbers
-    ]
-    return [*shifted, *errors.values()]
+    shifted = {path: replace(numbers[path], error=error.path) for path, error in errors.items()}
+    return [*{**numbers, **shifted}.values(), *errors.values()]
 
 
 def _numbers(mechanism: Fields) -> Iterator[Entry]:
@@ -116,9 +112,8 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
     for entry in walk(mechanism.joint_defaults, "joint_defaults", ("joint_defaults",)):
         friction = mechanism.joint_defaults.friction if entry.location[1] == "friction" else None
         yield _of_law(friction, entry) if friction else entry
-    zero = Quantity(0, KINDS["acceleration"])
     size = mechanism.coordinates
-    yield from walk(mechanism.gravity or (zero,) * size, "gravity", ("gravity",))
+    yield from walk(mechanism.gravity or (Quantity(0, KINDS["acceleration"]),) * size, "gravity", ("gravity",))
     for name, link in mechanism.effective_links.items():
         for entry in walk(link, f"links.{name}", ("links", name)):
             if size == 2 or entry.location[-1] != "inertia" or "inertia" in link.model_fields_set:
@@ -135,12 +130,47 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
     for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
             complete = part.complete() if isinstance(part, Driver | Gear) else part
+            turns = _turns(mechanism, section, name, part)
             for entry in walk(complete, f"{section}.{name}", (section, name)):
                 spoken = entry.quantity.names if section == "loads" else ()
                 varies = any(operand in moving or PLACED in operand for operand in spoken)
                 signed = section == "springs" and part.between is None and entry.location[-1] == "free_length"
                 rules = () if signed else entry.rules  # a length along a slide has a sign
-                yield replace(entry, kind=_narrow(mechanism, section, name, entry), varies=varies, rules=rules)
+                kind = _kind_in_place(mechanism, section, part, turns, entry)
+                yield replace(entry, kind=kind, varies=varies, rules=rules)
+
+
+def _turns(mechanism: Fields, section: str, name: str, part: Any) -> bool | None:
+    """Whether what a part is of turns, or slides; None where that is not said, or a finding of its own."""
+    if section == "gears":
+        return not part.slides
+    if section == "springs" and part.joint is None:
+        return False
+    joint = part.joint if section == "springs" else part.moves if section == "drivers" and part.moves else name
+    stated = mechanism.effective_joints.get(joint)
+    return None if stated is None else "rotation" in freedoms(stated.type)
+
+
+def _kind_in_place(mechanism: Fields, section: str, part: Any, turns: bool | None, entry: Entry) -> Kind:
+    """The kind that the place of an entry leaves of several: a slide is driven at a speed, a rotation at rad/s."""
+    key = entry.location[2] if len(entry.location) > 2 else ""
+    if section == "measures":
+        if key in ("along", "duration"):
+            return KINDS["time"] if key == "duration" else entry.kind
+        if key == "within":
+            return course_kind(mechanism, part)
+        if key not in ("at", "over") and not is_place(part):
+            return figure_kind(mechanism, part)
+        kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
+        return place_kind(mechanism, entry.quantity, {name: kind.dimensions[0] for name, kind in kinds.items()})
+    if section == "tables":
+        place = entry.location[-1] in (0, "period")
+        return (KINDS["time"] if part.over == "time" else drive_kind(mechanism)) if place else ANY
+    if section == "assembly" and entry.location[1] == AT and turns is None:
+        return drive_kind(mechanism)
+    if key == "motor" and entry.path.endswith(".place") and turns is not None:
+        return KINDS["time" if part.motor.over == "time" else "angular speed" if turns else "speed"]
+    return entry.kind if turns is None else entry.kind.of(turns)
 
 
 def walk(value: object, path: str, location: Location, rules: Rules = ()) -> Iterator[Entry]:
@@ -173,63 +203,49 @@ def walk(value: object, path: str, location: Location, rules: Rules = ()) -> Ite
                 yield from walk(item, f"{path}.{item_name(location, index)}", (*location, index))
 
 
-# of anything but coordinates
-_LISTS = (
-    *("points", "references", "links", "joints", "between", "loop", "correlations", "of", "values"),
-    *("files", "faults", "conditions"),
-)
+# by the key of a list, what its items are called, if not coordinates; of a row of points by what has the points
+_NAMES = {
+    **dict.fromkeys(("points", "references", "links", "joints", "between", "loop", "correlations", "of", "values",
+                     "files", "faults", "conditions"), ()),
+    **dict.fromkeys(("range", "over", "within"), ("from", "to")),
+    "rows of tables": ("at", "value"), "rows of motor": ("place", "effort"), "rows": ("time", "coordinate"),
+}  # fmt: skip
 
 
 def item_name(location: Location, index: int) -> str:
     """What an item of the list at a location is called in a path: a coordinate, an end, or its number."""
-    if location[-1] in _LISTS:
-        return str(index)
-    row = len(location) > 1 and location[-2] == "points" and isinstance(location[-1], int)
-    if row and location[0] == "tables":
-        return ("at", "value")[index] if index < 2 else str(index)
-    if row and "motor" in location:
-        return ("place", "effort")[index] if index < 2 else str(index)
-    if row:
-        names: tuple[str, ...] = ("time", "coordinate")
-    else:
-        names = ("from", "to") if location[-1] in ("range", "over", "within") else ("x", "y", "z")
+    key = location[-1]
+    if isinstance(key, int) and location[-2:-1] == ("points",):
+        of = "tables" if location[0] == "tables" else "motor" if "motor" in location else ""
+        key = f"rows of {of}" if of else "rows"
+    names = _NAMES.get(str(key), ("x", "y", "z"))
     return names[index] if index < len(names) else str(index)
 
 
 def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry]:
     """Numbers of a joint with its defaults: what is not its own follows `joint_defaults`."""
-    rows = [row.joint for row in mechanism.loop]
+    rows, path = [row.joint for row in mechanism.loop], f"joints.{name}"
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
-    yield from walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"), markers(Joint)["pitch"])
-    for key in ("pin", "guide", "friction", "losses", "stiffness", "seat"):
-        part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
-        place = f"joints.{name}.{key}"
-        shared = {number.path: number.quantity for number in walk(default, place, ())}
-        for entry in walk(part, place, (*location, key)):
+    shared = {entry.path: entry.quantity for entry in walk(mechanism.joint_defaults, path, ())}
+    for key in ("pitch", "pin", "guide", "friction", "losses", "stiffness", "seat", "contact", "misalignment"):
+        part = getattr(joint, key)
+        for entry in walk(part, f"{path}.{key}", (*location, key), markers(Joint)[key]):
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
                 entry = replace(entry, kind=entry.kind.of("rotation" in freedoms(joint.type)))
+            elif isinstance(part, Contact) and entry.location[-1] == "stiffness":
+                entry = replace(entry, kind=_contact_stiffness(part))
             follows = shared.get(entry.path) is entry.quantity
-            alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
-            yield replace(entry, alias=alias)
-    for entry in walk(joint.contact, f"joints.{name}.contact", (*location, "contact")):
-        stiff = entry.location[-1] == "stiffness"
-        yield replace(entry, kind=_contact_stiffness(joint.contact)) if stiff and joint.contact else entry
-    yield from _misalignment(joint, f"joints.{name}.misalignment", (*location, "misalignment"))
-    pin = joint.pin
+            yield replace(entry, alias=f"joint_defaults.{entry.path.removeprefix(f'{path}.')}") if follows else entry
+    pin, misalignment = joint.pin, joint.misalignment
+    if misalignment and misalignment.towards and misalignment.offset_towards is None:  # it follows that of the tilt
+        below, towards = f"{path}.misalignment", misalignment.towards
+        where = (*location, "misalignment", "offset_towards")
+        yield Entry(f"{below}.offset_towards", where, towards, towards.kind, f"{below}.towards")
     if pin and pin.length and not pin.bearing:
-        path = f"joints.{name}.pin"
-        yield Entry(f"{path}.bearing", (*location, "pin", "bearing"), pin.length, pin.length.kind, f"{path}.length")
-
-
-def _misalignment(joint: Joint, path: str, location: Location) -> Iterator[Entry]:
-    """How the axis of a joint lies off; the direction of its offset follows that of its tilt while it has no own."""
-    misalignment = joint.misalignment
-    yield from walk(misalignment, path, location)
-    if misalignment and misalignment.towards and misalignment.offset_towards is None:
-        towards = misalignment.towards
-        yield Entry(f"{path}.offset_towards", (*location, "offset_towards"), towards, towards.kind, f"{path}.towards")
+        length, where = pin.length, (*location, "pin", "bearing")
+        yield Entry(f"{path}.pin.bearing", where, length, length.kind, f"{path}.pin.length")
 
 
 def _contact_stiffness(contact: Contact) -> Kind:
@@ -239,8 +255,7 @@ def _contact_stiffness(contact: Contact) -> Kind:
         return ANY
     power = Fraction(str(exponent.evaluate())).limit_denominator(1000)
     text = f"N/m^{float(power):g}" if power != 1 else "N/m"
-    dimension = (1 - power, Fraction(1), Fraction(-2), Fraction(0))
-    return Kind("contact stiffness", text, f"60e9 {text}", (dimension,))
+    return Kind("contact stiffness", text, f"60e9 {text}", ((1 - power, Fraction(1), Fraction(-2), Fraction(0)),))
 
 
 def _of_law(friction: Friction, entry: Entry) -> Entry:
@@ -254,45 +269,6 @@ def _of_law(friction: Friction, entry: Entry) -> Entry:
     kind = usual or Kind(parameter, law_unit, f"1 {law_unit}", (unit(law_unit)[1],))
     ends = "(]" if parameter == "pair_factor" else "[]"  # at 0 there would be no friction, which is stated as such
     return replace(entry, kind=kind, rules=(Within(declared.minimum, declared.maximum, ends),))
-
-
-def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
-    """The kind that the place of an entry leaves of several: a slide is driven at a speed, a rotation at rad/s."""
-    if section == "measures":
-        return _measure_kind(mechanism, name, entry)
-    if section == "tables":
-        in_time = mechanism.tables[name].over == "time"
-        place = entry.location[-1] in (0, "period")
-        return (KINDS["time"] if in_time else drive_kind(mechanism)) if place else ANY
-    if section == "gears":
-        return entry.kind.of(turns=not mechanism.gears[name].slides)
-    if section == "assembly" and name == AT and name not in mechanism.effective_joints:
-        return drive_kind(mechanism)
-    spring = mechanism.springs[name] if section == "springs" else None
-    moved = mechanism.drivers[name].moves if section == "drivers" else None
-    joint = mechanism.effective_joints.get((spring.joint or "") if spring else moved or name)
-    if joint is None:  # of a spring along a line; else a finding of its own
-        return entry.kind.of(turns=False) if spring else entry.kind
-    turns = "rotation" in freedoms(joint.type)
-    if "motor" in entry.location and entry.path.endswith(".place"):
-        motor = mechanism.drivers[name].motor
-        return KINDS["time"] if motor and motor.over == "time" else KINDS["angular speed" if turns else "speed"]
-    return entry.kind.of(turns)
-
-
-def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:
-    """Of a position that of the drive or a time, else what the measure gives."""
-    measure = mechanism.measures[name]
-    if entry.location[2] == "along":
-        return entry.kind
-    if entry.location[2] == "duration":
-        return KINDS["time"]
-    if entry.location[2] == "within":
-        return course_kind(mechanism, measure)
-    if entry.location[2] not in ("at", "over") and not is_place(measure):
-        return figure_kind(mechanism, measure)
-    kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
-    return place_kind(mechanism, entry.quantity, {name: kind.dimensions[0] for name, kind in kinds.items()})
 
 
 def dimension_errors(entries: Iterable[Entry]) -> dict[str, Quantity]:

@@ -17,7 +17,7 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.changes import part_types, stated_at
 from trunnion.model.joint_parts import Friction
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location
+from trunnion.model.parameters import Location, item_name
 from trunnion.model.quantity import AnyQuantity, Quantity
 from trunnion.model.tolerance_parts import Cost, Variation
 from trunnion.model.tolerances import Varying
@@ -76,33 +76,28 @@ def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
     if not keys and isinstance(getattr(mechanism, first, None), str):  # fits, over_constraint
         yield "", (first,)
     sections = {key: getattr(mechanism, key) for key in type(mechanism).model_fields}
-    holders: list[tuple[str, Location, BaseModel, list[str]]] = []
+    holders: list[tuple[Location, BaseModel, tuple[str, ...]]] = []
     if isinstance(sections.get(first), BaseModel):
-        holders.append((first, (first,), sections[first], keys))
+        holders.append(((first,), sections[first], tuple(keys)))
     for section, entries in {**sections, "joints": mechanism.stated_joints}.items():
-        owner, *below = keys if first == section and keys else [first, *keys]
+        owner, *inner = keys if first == section and keys else [first, *keys]
         if isinstance(entries, Mapping) and isinstance(entries.get(owner), BaseModel):
-            holders.append((f"{section}.{owner}", (section, owner), entries[owner], below))
-    rows = [row.joint for row in mechanism.loop]
-    for path, location, part, below in holders:
+            holders.append(((section, owner), entries[owner], tuple(inner)))
+    rows, data = [row.joint for row in mechanism.loop], mechanism.data()
+    for location, part, below in holders:
         looped = location[0] == "joints" and location[-1] in rows
         place: Location = ("loop", rows.index(str(location[-1]))) if looped else location
-        index: tuple[int, ...] = ()
-        annotation = field_of(type(part), below)
-        if annotation is None and below[-1:] and below[-1] in tuple("xyz"):  # of a direction
-            stated = stated_at(mechanism.data(), (*place, *below[:-1]))
-            annotation, index = field_of(type(part), below[:-1]), ("xyz".index(below[-1]),)
-            if not isinstance(stated, list) and (stated is not None or not _has_components(annotation)):
-                continue
-        if annotation is not None and Friction in part_types(annotation):  # a plain number is the coefficient
-            annotation, below = AnyQuantity, [*below, "coefficient"]
-        group = stated_at(mechanism.data(), (*place, *below[:-1]))
-        open_to = (
-            group is None or isinstance(group, dict) or below[-2:-1] in (["friction"], ["seat"])
-        )  # or a short form
-        if annotation is not None and (open_to or index):
-            number = index or _is_number(annotation)
-            yield f"{path}.{'.'.join(below)}" if number else "", (*place, *below[: -1 if index else None], *index)
+        path, annotation = ".".join(map(str, (*location, *below))), field_of(type(part), below)
+        group, short = stated_at(data, (*place, *below[:-1])), below[-2:-1] in (("friction",), ("seat",))
+        if annotation is None and below[-1:] and below[-1] in tuple("xyz"):  # of a direction, which is made if need be
+            index, annotation = "xyz".index(below[-1]), field_of(type(part), below[:-1])
+            of_axes = item_name((*place, *below[:-1]), index) == below[-1] and _is_number(annotation, in_rows=True)
+            if of_axes and isinstance(group, list | None):
+                yield path, (*place, *below[:-1], index)
+        elif annotation is not None and (group is None or isinstance(group, dict) or short):
+            if Friction in part_types(annotation):  # a plain number is the coefficient
+                annotation, path, below = AnyQuantity, f"{path}.coefficient", (*below, "coefficient")
+            yield path if _is_number(annotation) else "", (*place, *below)
 
 
 def field_of(kind: type[BaseModel], keys: Sequence[str]) -> Any:
@@ -116,13 +111,8 @@ def field_of(kind: type[BaseModel], keys: Sequence[str]) -> Any:
     return fields[keys[0]] if len(keys) == 1 else next((inner for inner in below if inner is not None), None)
 
 
-def _has_components(annotation: Any) -> bool:
-    """Whether a field is a row of quantities, or may be one of several forms that is."""
-    return get_origin(annotation) is tuple or any(map(_has_components, get_args(annotation)))
-
-
-def _is_number(annotation: Any) -> bool:
-    """Whether a field is a quantity, or may be one of several forms that is."""
-    if annotation is Quantity:
-        return True
-    return get_origin(annotation) is not tuple and any(map(_is_number, get_args(annotation)))
+def _is_number(annotation: Any, in_rows: bool = False) -> bool:
+    """Whether a field is a quantity, or a row of them, or may be one of several forms that is."""
+    if annotation is Quantity or get_origin(annotation) is tuple:
+        return (annotation is Quantity) != in_rows
+    return any(_is_number(form, in_rows) for form in get_args(annotation))

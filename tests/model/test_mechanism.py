@@ -306,7 +306,7 @@ def test_place_and_window_of_a_measure_can_be_set(varied: Mechanism) -> None:
 
 def test_no_coordinate_stands_for_an_end_of_a_range() -> None:
     press = Mechanism.read(next(path for path in EXAMPLES if path.stem == "inverted-slider-crank"))
-    name, driver = next((name, driver) for name, driver in press.drivers.items() if driver.range)
+    name = next(name for name, driver in press.drivers.items() if driver.range)
     assert press.path_of(f"drivers.{name}.range.from") == f"drivers.{name}.range.from"
     for wrong in ("x", "y", "form"):
         with pytest.raises(MechanismError, match="no number named"):

@@ -272,21 +272,6 @@ def test_what_does_not_go_together_is_refused() -> None:
     assert RSSR.with_values({"A.misalignment.tilt": "45 deg"})  # the limit itself, whatever it rounds to
 
 
-@pytest.mark.parametrize(
-    "pin", [{"fit": "40 mmH7/g6"}, {"fit": "H7/g6", "radius": "20 mm"}, {"fit": "H7/g6", "radius": 0.02}]
-)
-def test_classes_beside_a_radius_are_the_fit_of_twice_the_radius(pin: dict[str, Any]) -> None:
-    data = FOURBAR.data()
-    numbers = []
-    for stated in ({"fit": "40 mm H7/g6"}, pin):
-        data["joints"]["B"]["pin"] = stated
-        mechanism = Mechanism(**data)
-        assert Mechanism(**mechanism.data()) == mechanism
-        numbers.append([mechanism.parameters()[f"joints.B.pin.{key}"] for key in ("radius", "hole_radius")])
-    assert numbers[0] == pytest.approx(numbers[1], abs=1e-15)
-    assert numbers[0] == pytest.approx([0.02 - 17e-6 / 2, 0.02 + 12.5e-6 / 2])  # g6 −9/−25, H7 0/+25 µm of 40 mm
-
-
 RSSR_PIN = {key: value for key, value in RSSR.data()["joints"]["D"]["pin"].items() if key != "length"}
 
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.mechanisms import four_bar
 
-from trunnion import Mechanism, MechanismError, check
+from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, BASES, KINDS, UnitError, root, unit
@@ -210,9 +210,9 @@ def test_spellings_in_use(text: str, factor: float) -> None:
         ("mdeg", "deg"), ("mgon", "gon"), ("Grev", "rev"), ("kturn", "turn"), ("krpm", "rpm"), ("Mm", "'mm'"),
         ("MM", "'mm'"), ("Min", "'min'"), ("KN", "kN"), ("kn", "kN"), ("mPa", "MPa"), ("Mpa", "MPa"), ("Kg", "kg"),
         ("u/min", "rpm"), ("r/min", "rpm"), ("min-1", "rpm"), ("RPM", "rpm"), ("PS", "kW"), ("mil", "thou"),
-        ("ton", "t for 1000 kg"), ("cd", ""), ("ha", ""), ("pA", "Pa"), ("a", "A for ampere"), ("b", ""), ("P", "Pa"),
-        ("Nms", "N m s"), ("Ns", "N s"), ("N/Mm", "'mm'"), ("Nm/Grad", "deg"), ("m⁄s", ""), ("m\\s", ""),
-        ("hh:mm:ss", "write s"), ("dB", ""), ("g_0", "m/s^2"), ("light_year", ""), ("KNm", "kNm"), ("NM", "N m"),
+        ("ton", "t for 1000 kg"), ("cd", ""), ("ha", ""), ("pA", "Pa"), ("a", ""), ("b", ""), ("P", "Pa"),
+        ("N/Mm", "'mm'"), ("Nm/Grad", "deg"), ("m⁄s", ""), ("m\\s", ""),
+        ("hh:mm:ss", "write s"), ("dB", ""), ("light_year", ""), ("NM", "N m"),
     ],
 )  # fmt: skip
 def test_others_are_findings(text: str, remedy: str) -> None:
@@ -292,20 +292,13 @@ def test_what_is_no_product(text: str) -> None:
         ("1/2 in", "length", "write 0.5 in"), ("1-1/2 in", "length", "write 1.5 in"),
         ("10 kp", "force", "write kgf, or N"),
         ("10 N.m", "moment", "write 10 N m"), ("2 kg.m^2", "moment of inertia", "write 2 kg m^2"),
-        ("Ø 24 mm", "length", "write 24 mm"), ("3 inchs", "length", "write in"),
+        ("Ø 24 mm", "length", "write 24 mm"),
     ],
 )  # fmt: skip
 def test_the_spelling_that_is_meant(text: str, kind: str, remedy: str) -> None:
     with pytest.raises(UnitError) as caught:
         Quantity.read(text, KINDS[kind])
     assert caught.value.remedy == remedy
-
-
-@pytest.mark.parametrize(("text", "number"), [("30.000 N m", "30000"), ("1.500 N m", "1500"), ("2.5 N m", "")])
-def test_a_number_that_may_be_thousands(text: str, number: str) -> None:
-    data = {**four_bar(), "loads": {"out": {"joint": "D", "resisting_torque": text}}}
-    warned = [one for one in check(Mechanism(**data)).findings if one.where == "loads.out.resisting_torque"]
-    assert [f"not as {number}" in one.what for one in warned] == [True] * bool(number)
 
 
 @pytest.mark.parametrize("text", ["Ø 24 H7/g6", "24 H7/g6", "⌀24 mm H7/g6"])

@@ -15,7 +15,6 @@ from pydantic import (
     PlainValidator,
     Tag,
     WithJsonSchema,
-    model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
@@ -85,7 +84,6 @@ Pitch = Annotated[Length, NotZero("the thread does not advance")]
 _FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
 _PLAIN = re.compile(r"[0-9]+(\.[0-9]*)?")
 _CLASSES = re.compile(r"\s*[A-Z]{1,2}[0-9]{1,2}\s*/\s*[a-z]{1,2}[0-9]{1,2}\s*")
-_LIMITS = re.compile(r"±|[+-][\d.]+ */ *[+-]")  # as limits are written
 
 
 @dataclass(frozen=True)
@@ -148,18 +146,6 @@ class Pin(Part):
     offset: Length | None = None
     cylindricity: Annotated[Length | None, NotNegative] = None
     end_float: Annotated[Length | None, NotNegative] = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fit_of_radius(cls, data: Any) -> Any:
-        """Classes beside a radius, `{radius: 20 mm, fit: H7/g6}`, are the fit of twice the radius."""
-        fit, radius = (data.get(key) for key in ("fit", "radius")) if isinstance(data, Mapping) else (None, None)
-        if not (isinstance(fit, str) and _CLASSES.fullmatch(fit) and isinstance(radius, str | int | float)):
-            return data
-        if _LIMITS.search(str(radius)):
-            return data  # the fit has limits of its own: a finding says so
-        size = radius if isinstance(radius, str) else f"{radius} m"
-        return {key: value for key, value in data.items() if key != "radius"} | {"fit": f"2 * ({size}) {fit.strip()}"}
 
 
 class Guide(Part):

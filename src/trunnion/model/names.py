@@ -23,16 +23,6 @@ __all__ = [
 SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
 _PLAIN = re.compile(r"[^\W\d](?:[\w. +/-]*\w)?")  # what YAML takes for a text as it stands, in braces too
-# words in common use for those of a model file: too unlike them to be found by their letters
-MEANT = {
-    "rectangular": "uniform",
-    "gauss": "normal",
-    "gaussian": "normal",
-    "diameter": "radius",
-    "torque": "effort",
-    "speed": "rate",
-}
-REMARKS = {"radius": ", half the diameter"}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
 
 
@@ -46,8 +36,6 @@ def nearest(name: str, names_known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known ones, else the first few that exist."""
     name, names = str(name), list(dict.fromkeys(names_known))
     folded = {name_known.casefold(): name_known for name_known in reversed(names)}
-    if (meant := MEANT.get(name.casefold())) in names:
-        return f"did you mean '{meant}'{REMARKS.get(meant, '')}?"
     close = [folded[name_known] for name_known in get_close_matches(name.casefold()[:80], folded, n=3, cutoff=0.6)]
     if close:
         return "did you mean " + " or ".join(f"'{name_known}'" for name_known in close) + "?"

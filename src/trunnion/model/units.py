@@ -92,25 +92,25 @@ class Kind:
 
 TURNING = ("angle", "angular speed", "moment", "moment of inertia", "torsional stiffness", "torsional damping")
 KINDS: dict[str, Kind] = {
-    kind.name: kind
-    for kind in (
-        Kind("number", "1", "0.1", (NUMBER,)),
-        Kind("length", "m", "60 mm", (_dimension(length=1),)),
-        Kind("angle", "rad", "30 deg", (ANGLE,)),
-        Kind("mass", "kg", "1.2 kg", (_dimension(mass=1),)),
-        Kind("time", "s", "0.2 s", (_dimension(time=1),)),
-        Kind("moment of inertia", "kg m^2", "4e-4 kg m^2", (_dimension(length=2, mass=1),)),
-        Kind("force", "N", "1 kN", (_dimension(length=1, mass=1, time=-2),)),
-        Kind("moment", "N m", "10 N m", (_dimension(length=2, mass=1, time=-2),)),
-        Kind("angular speed", "rad/s", "1500 rpm", (_dimension(time=-1, angle=1),)),
-        Kind("speed", "m/s", "50 mm/s", (_dimension(length=1, time=-1),)),
-        Kind("acceleration", "m/s^2", "9.81 m/s^2", (_dimension(length=1, time=-2),)),
-        Kind("stiffness", "N/m", "2 N/mm", (_dimension(mass=1, time=-2),)),
-        Kind("torsional stiffness", "N m/rad", "3 N m/rad", (_dimension(length=2, mass=1, time=-2, angle=-1),)),
-        Kind("damping", "N s/m", "50 N s/m", (_dimension(mass=1, time=-1),)),
-        Kind("density", "kg/m^3", "7850 kg/m^3", (_dimension(length=-3, mass=1),)),
-        Kind("pressure", "Pa", "210 GPa", (_dimension(length=-1, mass=1, time=-2),)),
-        Kind("torsional damping", "N m s/rad", "0.1 N m s/rad", (_dimension(length=2, mass=1, time=-1, angle=-1),)),
+    name: Kind(name, si, example, (_dimension(*powers),))  # powers: of length, mass, time and angle
+    for name, si, example, *powers in (
+        ("number", "1", "0.1"),
+        ("length", "m", "60 mm", 1),
+        ("angle", "rad", "30 deg", 0, 0, 0, 1),
+        ("mass", "kg", "1.2 kg", 0, 1),
+        ("time", "s", "0.2 s", 0, 0, 1),
+        ("moment of inertia", "kg m^2", "4e-4 kg m^2", 2, 1),
+        ("force", "N", "1 kN", 1, 1, -2),
+        ("moment", "N m", "10 N m", 2, 1, -2),
+        ("angular speed", "rad/s", "1500 rpm", 0, 0, -1, 1),
+        ("speed", "m/s", "50 mm/s", 1, 0, -1),
+        ("acceleration", "m/s^2", "9.81 m/s^2", 1, 0, -2),
+        ("stiffness", "N/m", "2 N/mm", 0, 1, -2),
+        ("torsional stiffness", "N m/rad", "3 N m/rad", 2, 1, -2, -1),
+        ("damping", "N s/m", "50 N s/m", 0, 1, -1),
+        ("density", "kg/m^3", "7850 kg/m^3", -3, 1),
+        ("pressure", "Pa", "210 GPa", -1, 1, -2),
+        ("torsional damping", "N m s/rad", "0.1 N m s/rad", 2, 1, -1, -1),
     )
 }
 ANY = Kind("quantity", "SI", "60 mm", ())
@@ -350,24 +350,19 @@ _USUAL: Final = (
     "mm cm m µm km in ft deg rad mrad kg g mg t lb s ms min N mN kN MN lbf Pa kPa MPa GPa bar psi J kJ W kW rpm "
     "V mV A mA Hz kHz gon rev turn"
 )
-_DEGREES = "write deg for degrees, 360 to a turn, or gon, 400 to a turn"
-_SPEED = "write rpm, or rad/s"
-# What other spellings are likely to mean.
+# What other spellings are likely to mean, by what to write.
 _MEANT: Final = {
-    "grad": _DEGREES, "grade": _DEGREES, "grads": _DEGREES, "gradian": _DEGREES, "altgrad": "write deg",
-    "mil": "write thou for 0.001 in, or mrad for an angle", "mils": "write thou for 0.001 in, or mrad for an angle",
-    "ton": "write t for 1000 kg, or lb", "tons": "write t for 1000 kg, or lb", "kp": "write kgf, or N",
-    "ps": "write kW; 1 PS are 0.7355 kW", "mpa": "write MPa for a pressure, Pa s for a viscosity", "gon": "write gon",
-    "c": "write °C for a temperature, pC or nC for a charge",
-    "a": "write A for ampere", "u": _SPEED, "r": _SPEED, "umin": _SPEED, "tr": _SPEED, "upm": _SPEED, "cps": _SPEED,
-    "cycle": "write turn, or Hz", "cycles": "write turn, or Hz", "mdeg": "write it in deg, or mrad",
-    "kn": "write kN for a force, km/h for a speed", "kt": "write km/h for a speed, kg or t for a mass",
-    "g_n": "write m/s^2", "g_0": "write m/s^2", "zoll": "write in", "umdr": _SPEED, "nms": "write N m s",
-    "ns": "write N s for a momentum, ns for a time", "std": "write h", "sekunden": "write s", "grd": _DEGREES,
-    "knm": "write kNm", "inchs": "write in", "feets": "write ft", "nm": "write N m for a torque, nm for a length",
+    spelling: remedy
+    for remedy, spellings in {
+        "write deg for degrees, 360 to a turn, or gon, 400 to a turn": "grad grade grads gradian grd altgrad",
+        "write rpm, or rad/s": "u r umin tr upm cps umdr", "write turn, or Hz": "cycle cycles",
+        "write t for 1000 kg, or lb": "ton tons", "write kgf, or N": "kp", "write kW; 1 PS are 0.7355 kW": "ps",
+        "write thou for 0.001 in, or mrad for an angle": "mil mils", "write MPa, or Pa s for a viscosity": "mpa",
+        "write kN for a force, km/h for a speed": "kn", "write N m for a torque, nm for a length": "nm",
+    }.items() for spelling in spellings.split()
 }  # fmt: skip
 _PHRASES: Final = {  # whole units, without their spaces
-    re.compile(r"[uUrR](pm|PM)?/[Mm]in\.?|[Mm]in(-1|⁻¹)|[1I]?/[Mm]in\.?"): _SPEED,
+    re.compile(r"[uUrR](pm|PM)?/[Mm]in\.?|[Mm]in(-1|⁻¹)|[1I]?/[Mm]in\.?"): "write rpm, or rad/s",
     re.compile(r"[uUrR]/s|s(-1)"): "write rad/s, rpm or Hz",
     re.compile(r"(.*/)?[Hh]{1,2}:[Mm]{2}(:[Ss]{2})?.*"): "write s",
 }
@@ -383,9 +378,13 @@ def _plain(text: str) -> str:
 
     In `mV/Nm` both are below the stroke.
     """
-    spaced = _TORQUE.sub(_torque, normalise(text))
-    spaced = _SECOND.sub("s", _TURNS.sub("rev/", spaced))
-    return spaced.replace("·", "*")
+
+    def torque(match: re.Match[str]) -> str:
+        product = f"{match[1]}N {match[2]}"
+        return f"{product}{match[3]}" if match[3] else f"({product})"
+
+    spaced = _TURNS.sub("rev/", _TORQUE.sub(torque, normalise(text)))
+    return _SECOND.sub("s", spaced).replace("·", "*")
 
 
 def pound_feet(text: str) -> str:
@@ -401,17 +400,8 @@ def pound_feet(text: str) -> str:
     return product(alone) if alone else _POUND_FEET.sub(product, text)
 
 
-def _torque(match: re.Match[str]) -> str:
-    product = f"{match[1]}N {match[2]}"
-    return f"{product}{match[3]}" if match[3] else f"({product})"
-
-
 def _remedy(text: str, word: str) -> str:
     """What to write instead of a unit with a word that is none; empty where nothing is near."""
-    bare = "".join(text.split())
-    if remedy_text := next((remedy for phrase, remedy in _PHRASES.items() if phrase.fullmatch(bare)), ""):
-        return remedy_text
-    if remedy_text := _MEANT.get(word.casefold(), ""):
-        return remedy_text
-    near = nearest(word, _USUAL.split())
-    return near if near.startswith("did you mean") else ""
+    bare, near = "".join(text.split()), nearest(word, _USUAL.split())
+    phrase = next((remedy for phrase, remedy in _PHRASES.items() if phrase.fullmatch(bare)), "")
+    return phrase or _MEANT.get(word.casefold(), "") or (near if near.startswith("did you mean") else "")

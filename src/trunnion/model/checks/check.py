@@ -28,7 +28,7 @@ from trunnion.model.checks.loads import (
 from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.motion import driver_findings, driver_values, gear_values, gears, loop
 from trunnion.model.checks.tolerances import cost_values, meant, tolerance_names, tolerance_values
-from trunnion.model.checks.units import forgotten_units, plain_angles, thousands
+from trunnion.model.checks.units import forgotten_units, plain_angles
 from trunnion.model.joint_parts import has_pin, motions
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Entry, ParameterSet, dimension_errors
@@ -133,7 +133,7 @@ def _quantities(mechanism: Varying) -> Iterator[Finding]:
             yield Finding(f"'{quantity.source}' has a tolerance, and {why}", entry.where)
         if not missing and entry.path.partition(".")[0] != "dimensions":
             try:
-                yield from thousands(entry.where, quantity, quantity.check(sayable, entry.kind))
+                quantity.check(sayable, entry.kind)
                 sound.append((entry, sayable))
             except UnitError as error:
                 yield Finding(error.what, entry.where, error.remedy)
@@ -160,7 +160,6 @@ def _dimensions(mechanism: Varying, by_name: dict[str, Dimension | None]) -> Ite
         if set(quantity.names) <= by_name.keys():
             try:
                 by_name[name] = quantity.check(by_name, ANY)
-                yield from thousands(where, quantity, by_name[name])
             except UnitError as error:
                 yield Finding(error.what, where, error.remedy)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from trunnion.errors import Finding, Severity
@@ -13,7 +12,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.tolerances import Varying
 from trunnion.model.units import KINDS, NUMBER, Dimension, UnitError, unit
 
-__all__ = ["bare_number", "forgotten_units", "in_radians", "plain_angles", "thousands"]
+__all__ = ["bare_number", "forgotten_units", "in_radians", "plain_angles"]
 
 FAR = 20.0  # times the largest length with a unit: a plain length above it is none of this mechanism
 LENGTH = KINDS["length"]
@@ -125,16 +124,3 @@ def in_radians(where: str, value: float, verb: str = "is") -> Finding:
     what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
     remedy = f"write {value:g} deg if it is in degrees, else {value:g} rad"
     return Finding(what, where, remedy, Severity.WARNING if doubtful else Severity.NOTE)
-
-
-# ---- points of thousands --------------------------------------------------------------------------------------
-
-_GROUPED = re.compile(r"(?<![\w.])[1-9][0-9]{0,2}\.[0-9]00(?=\s*[^\W\d])")  # and a unit
-
-
-def thousands(where: str, quantity: Quantity, dimension: Dimension | None) -> Iterator[Finding]:
-    """A warning of 30.000 N, which is 30 N, where thirty thousand may be meant; lengths are stated so in drawings."""
-    text = str(quantity.source)
-    if dimension not in (None, LENGTH.dimensions[0], NUMBER) and (number := _GROUPED.search(text)):
-        what = f"'{number[0]}' in '{text[:60]}' is read as {float(number[0]):g}, not as {number[0].replace('.', '')}"
-        yield Finding(what, where, "write one of the two without closing zeros behind a point", Severity.WARNING)

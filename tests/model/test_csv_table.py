@@ -12,10 +12,9 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS
+from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS, MOST_FILES
 from trunnion.model.mechanism import read_mechanism
 from trunnion.model.rewrite import rewrite_mechanism
-from trunnion.model.text import MOST_FILES
 
 SLIDER_CRANK = Path(__file__).resolve().parents[2] / "examples" / "slider-crank.yaml"  # driver O, table pressure
 MODEL = read_mechanism(SLIDER_CRANK)

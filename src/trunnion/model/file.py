@@ -24,8 +24,7 @@ from ruamel.yaml.parser import Parser
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.csv_table import TableFiles, place_findings, with_points
-from trunnion.model.text import read_text
+from trunnion.model.csv_table import TableFiles, place_findings, read_text, with_points
 
 __all__ = [
     "Lines", "composed", "entries_of", "place", "placed", "read_entries", "read_model", "text_of",

@@ -15,9 +15,9 @@ from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
+from trunnion.model.csv_table import OF_A_FILE, stated_files
 from trunnion.model.file import composed, entries_of, read_entries, text_of, yaml_writer
 from trunnion.model.mechanism import Mechanism, read_mechanism
-from trunnion.model.text import OF_A_FILE, stated_files
 
 __all__ = ["changed_text", "rewrite_mechanism"]
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.changes import with_law
+from trunnion.model.csv_table import stated_files
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.text import stated_files
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
 from trunnion.solve.run import Run, prepare

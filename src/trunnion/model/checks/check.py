@@ -15,9 +15,15 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.joints import joint_findings, joint_values
-from trunnion.model.checks.loads import (
+from trunnion.model.checks.measures import check_measure, measure_values
+from trunnion.model.checks.parts import (
+    driver_findings,
+    driver_values,
     expression_name,
+    gear_values,
+    gears,
     load_findings,
+    loop,
     motion_dimensions,
     spring_values,
     springs,
@@ -25,8 +31,6 @@ from trunnion.model.checks.loads import (
     tables,
     unknown_name,
 )
-from trunnion.model.checks.measures import check_measure, measure_values
-from trunnion.model.checks.motion import driver_findings, driver_values, gear_values, gears, loop
 from trunnion.model.checks.tolerances import cost_values, meant, tolerance_names, tolerance_values
 from trunnion.model.checks.units import forgotten_units, plain_angles
 from trunnion.model.joint_parts import has_pin, motions

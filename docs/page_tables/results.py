@@ -88,7 +88,7 @@ def tolerances_table() -> str:
 
 def identification_table() -> str:
     """Every variable of an identification."""
-    from trunnion.rig.identification.result import VARIABLES
+    from trunnion.rig.identification.identify import VARIABLES
 
     return _described("dimension", VARIABLES)
 

@@ -47,8 +47,6 @@ SOURCES: dict[str, tuple[dict[str, Any], float]] = {
     "column": ({"from": "column", "column": "deg", "unit": "deg"}, 4e-3),
     "column in rad": ({"from": "column", "column": "angle"}, 4e-3),
     "time": ({"from": "time", "speed": "600 rpm", "zero": f"{ZERO - OMEGA * IDLE} rad"}, 4e-3),
-    "speed": ({"from": "speed", "channel": "speed-in", "zero": f"{ZERO} rad"}, 0.1),
-    "speed and index": ({"from": "speed", "channel": "speed-in", "index": {"column": "z"}}, 0.1),
 }
 
 
@@ -137,23 +135,6 @@ def test_filter_has_no_delay_and_halves_the_power_at_its_cut_off(clean: Columns,
     assert any("200 Hz" in sentence for sentence in found.done)
 
 
-def test_conditions_of_a_column(clean: Columns, tmp_path: Path) -> None:
-    columns = {**clean, "beta": np.where(clean["t"] < 0.8, 15.0, np.where(clean["t"] < 1.5, 20.0, 15.0))}
-    settings = {"misalignment": {"column": "beta", "unit": "deg"}, "input.speed": {"mean": "speed-in"}, "load": "3 N m"}
-    found = read(columns, tmp_path, {"set": settings})
-    assert [one.name for one in found.conditions] == [
-        "load 3 N m, misalignment 15 deg",
-        "load 3 N m, misalignment 20 deg",
-    ]
-    first, second = found.conditions
-    assert first.values["misalignment"] == pytest.approx(np.radians(15))
-    assert first.values["input.speed"] == pytest.approx(OMEGA, rel=1e-4)
-    assert first.values["load"] == 3
-    assert [one.courses["brake"].turns.shape[0] for one in (first, second)] == [11, 6]
-    with pytest.raises(MechanismError, match="a measured value is not a setting"):
-        read({**columns, "beta": clean["angle"]}, tmp_path, {"set": settings})
-
-
 def test_a_mean_of_a_channel_is_over_time(tmp_path: Path) -> None:
     """Of a speed that varies within the turn the mean over equal angles is too high, by half its share squared."""
     angle = np.linspace(0, 40 * np.pi, 400_001)
@@ -172,24 +153,15 @@ def test_a_mean_of_a_channel_is_over_time(tmp_path: Path) -> None:
     assert one.courses["speed-in"].turns.mean() == pytest.approx(OMEGA, rel=3e-4)
 
 
-def test_part_of_a_file(clean: Columns, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    changes = {"files": [{"file": "run.csv", "over": ["0.5 s", "1.05 s"]}]}
-    (named,) = read(clean, tmp_path, changes).conditions  # a file of that name on the command line
-    monkeypatch.chdir(tmp_path)
-    (one,) = read_measured(mapping(changes)).conditions
-    assert one.courses["brake"].turns.shape[0] == named.courses["brake"].turns.shape[0] == 4
-
-
 def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> None:
-    columns = {**clean, "beta": np.full(clean["t"].size, 15.0)}
-    settings = {"misalignment": {"column": "beta", "unit": "deg"}, "load": "3 N m", "a": {"mean": "brake"}, "b": 2}
-    (one,) = read(columns, tmp_path, {"set": settings}).conditions
+    settings = {"misalignment": "15 deg", "load": "3 N m", "a": {"mean": "brake"}, "b": 2}
+    (one,) = read(clean, tmp_path, {"set": settings}).conditions
     assert one.units == {"misalignment": "rad", "load": "N m", "a": "N m"}
-    (warm,) = read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}}).conditions
+    (warm,) = read(clean, tmp_path, {"set": {"misalignment": "15 degC"}}).conditions
     with pytest.raises(MechanismError, match="'K' is not one of mechanics \\(in condition misalignment 15 degC\\)"):
         in_condition(trunnion.read("examples/pezzuti-cardan.yaml"), warm)
     with pytest.raises(MechanismError, match="± 1 deg"):
-        read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
+        read(clean, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 
 
 @pytest.mark.sample(6)
@@ -217,13 +189,6 @@ def test_a_counter_that_is_set_back_is_refused(clean: Columns, tmp_path: Path) -
     counts[6000:] -= counts[6000]
     with pytest.raises(MechanismError, match=r"is set back 1 time, at 1.1998 s — state wrap"):
         read({**clean, "encoder": counts}, tmp_path)
-
-
-@pytest.mark.parametrize(("zero", "told"), [("1 N m", True), ("15 N m", False)])
-def test_a_power_within_the_zero_tells_no_sign(clean: Columns, tmp_path: Path, zero: str, told: bool) -> None:
-    """The torque is −20 N m in the mean."""
-    changes = {"channels/torque-in/accuracy": {"zero": zero}, "channels/torque-in/sign": -1}
-    assert any(one.code == "data.power.sign" for one in read(clean, tmp_path, changes).findings) is told
 
 
 def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
@@ -275,22 +240,6 @@ def test_filter_keeps_gaps(clean: Columns, tmp_path: Path) -> None:
     (one,) = read(columns, tmp_path, changes).conditions
     assert np.count_nonzero(np.isnan(one.courses["torque-in"].turns)) == pytest.approx(400 / 500 * 90, abs=2)
     assert off(one) < 0.03
-
-
-REFUSED: list[tuple[str, float, dict[str, Any], str]] = [
-    ("encoder", 0.0, {}, "has 0 pulses: there are no turns"),
-    ("T2", np.nan, {"set": {"misalignment": {"mean": "brake"}}}, "set.misalignment: the channel 'brake', whose mean"),
-    ("z", 0.0, {"channels/torque-in/gain": "1e308 V/(N m)"}, "a reading of 1 is"),
-    ("z", 0.0, {"channels/torque-in/gain": "1e-150 V/(N m)"}, "a reading of 1 is"),
-]
-
-
-@pytest.mark.parametrize(("column", "value", "changes", "what"), REFUSED)
-def test_what_is_refused(
-    clean: Columns, tmp_path: Path, column: str, value: float, changes: dict[str, Any], what: str
-) -> None:
-    with pytest.raises(MechanismError, match=what):
-        read({**clean, column: np.full(clean["t"].size, value)}, tmp_path, changes)
 
 
 TOLD: list[tuple[dict[str, Any], set[str], str]] = [

@@ -43,21 +43,6 @@ def recorded(
 TURN = np.radians(360 * np.arange(1000) / 1000)
 
 
-@pytest.mark.parametrize(
-    ("noise", "decimals", "channel", "expected"),
-    [(0.1, 1, {}, 0.1 / np.sqrt(12)), (0.0, 6, {"resolution": "0.2 deg"}, 0.2 / np.sqrt(6))],
-    ids=["noise carries readings over the steps", "a resolution that is stated"],
-)
-def test_what_counts_of_steps(
-    tmp_path: Path, noise: float, decimals: int, channel: dict[str, str], expected: float
-) -> None:
-    values = np.degrees(rocker(TURN)) + np.random.default_rng(1).normal(0, noise, (12, 1000))
-    values = values if noise else values[0]
-    course = recorded(tmp_path, np.round(values, decimals), decimals, **channel).conditions[0].courses["psi"]
-    assert (course.accuracy.resolution == 0) == (noise > 0)
-    assert np.median(course.uncertainty) == pytest.approx(np.radians(expected), rel=0.3 if noise else 1e-3)
-
-
 @pytest.mark.spread(6)
 @pytest.mark.parametrize("samples", [20, 200, 1000, 4000])
 @pytest.mark.parametrize("step", [0.001, 0.1, 0.5, 2.0, 20 / 2**7])
@@ -86,13 +71,6 @@ def test_an_angle_that_is_cut_off_does_not_speak_against_the_model(tmp_path: Pat
     assert result.attrs["all_within"]
     assert float(result["bias_expanded"].squeeze()) == pytest.approx(2 * np.radians(0.1) / np.sqrt(12), rel=0.05)
     assert abs(float(result["bias"].squeeze())) == pytest.approx(np.radians(0.05), rel=0.05)
-
-
-def test_the_speed_may_be_that_of_the_angle(tmp_path: Path) -> None:
-    data = recorded(tmp_path, np.degrees(rocker(TURN)), 3, {"set": {"A.speed": {"mean": "angle"}}})
-    assert data.conditions[0].values["A.speed"] == pytest.approx(2 * np.pi, rel=1e-6)
-    with pytest.raises(MechanismError, match="there is no channel 'angel'"):
-        recorded(tmp_path, np.degrees(rocker(TURN)), 3, {"set": {"A.speed": {"mean": "angel"}}})
 
 
 @pytest.mark.parametrize("stated", ["60 rpm", {"mean": "angle"}])

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from measured_data.recording import Columns, codes, off, read, recorded
@@ -106,13 +105,6 @@ def test_faults_are_named(
     assert named[0].file.endswith("run.csv")
     if spoil not in (_drift, _unsteady):  # these stay in the means, all others are left out of them
         assert off(found.conditions[0]) < 0.12
-
-
-def test_texts_among_numbers(run: Columns, tmp_path: Path) -> None:
-    frame = pd.DataFrame(run).astype({"T1": object})
-    frame.loc[5000:5004, "T1"] = "ERR"
-    (one,) = read(frame, tmp_path).findings
-    assert "(5 texts such as 'ERR'): 5 cells" in one.what
 
 
 def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
@@ -224,21 +216,6 @@ def test_drift_is_removed_from_when_the_zero_was_read(run: Columns, tmp_path: Pa
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
 
 
-def test_a_zero_that_differs_between_unloaded_stretches_is_uncertain(run: Columns, tmp_path: Path) -> None:
-    """The zero is their mean, and uncertain by what they differ by."""
-    rest = recorded(turns=3)
-    idle = {name: values[:900] for name, values in rest.items()}
-    long = {name: np.concatenate([run[name], idle[name]]) for name in run}
-    long["t"] = np.arange(long["t"].size) / 5000.0
-    last = int(run["encoder"][-1])
-    long["encoder"][-900:], long["angle"][-900:] = last, run["angle"][-1]
-    long["T1"] += 0.05 * (long["t"] - 0.1)
-    changes = {"channels/torque-in/zero": {"over": [["0 s", "0.19 s"], ["2.21 s", "2.37 s"]]}}
-    found = read(long, tmp_path, changes).conditions[0].courses["torque-in"].accuracy
-    apart = 10 * 0.05 * (2.29 - 0.095)  # N m, by a drift of 0.05 V/s
-    assert found.zero == pytest.approx(apart / 12**0.5, rel=0.02)
-
-
 def test_lost_pulses_by_the_index(run: Columns, tmp_path: Path) -> None:
     run["z"] = (run["angle"] / (2 * np.pi) % 1 < 0.02) * 1.0
     changes = {"angle/index": {"column": "z"}}
@@ -262,12 +239,3 @@ def test_sampling_too_slow(run: Columns, tmp_path: Path) -> None:
     level = {**run, "encoder": (run["angle"] / (2 * np.pi) * 60 % 1 < 0.5) * 5.0}
     thin = {name: values[::5] for name, values in level.items()}
     assert "data.pulses.few_samples" in codes(read(thin, tmp_path, {"angle/kind": "level"}))
-
-
-def test_few_turns_and_a_sensor_that_never_changes(run: Columns, tmp_path: Path) -> None:
-    short = {name: values[:2000] for name, values in run.items()}
-    assert codes(read(short, tmp_path)) == {"data.turns.one"}
-    with pytest.raises(MechanismError, match=r"no whole turn: 0\.\d+ cycles in 292 rows"):
-        read({name: values[:1300] for name, values in run.items()}, tmp_path)
-    run["T2"][:] = 3.3
-    assert codes(read(run, tmp_path)) == {"data.readings.constant"}

@@ -62,19 +62,3 @@ def test_units_of_headings_and_thousands(tmp_path: Path, header: str) -> None:
     assert speed.mean.mean() == pytest.approx(SPEED * np.pi / 30, rel=1e-6)
     assert speed.shown == ("rpm" if "1/min" in header else "U/min", pytest.approx(np.pi / 30))
     assert {one.code for one in found.findings} == {"data.readings.constant"}  # of the speed
-
-
-def test_an_angle_in_steps_is_smoothed_to_what_the_shaft_does(tmp_path: Path) -> None:
-    """Steps of 8°, every turn in the same places, leave 14 N m of a slope of 200 N m/rad; smoothed, below 2."""
-    mapping = recorded(tmp_path, "Zeit [ms];Winkel [°];Moment [Nm];Drehzahl [U/min]", step=8.0)
-    true = 1450.33 + 200 * np.sin(2 * np.pi * np.arange(72) / 72)
-
-    def off() -> float:
-        found = read_measured(mapping, [tmp_path / "lauf.csv"])
-        stated = "resolution" in mapping["angle"]
-        assert (found.conditions[0].cut > 0) == stated
-        return float(np.max(np.abs(found.conditions[0].courses["M"].mean - true)))
-
-    rough = off()
-    mapping["angle"]["resolution"] = "8 deg"
-    assert off() < 2.0 < rough / 3

@@ -128,12 +128,6 @@ def test_time_stamps_of_binary_files(columns: Columns, tmp_path: Path, end: str)
     assert off(read_measured(mapping({"time": {"column": "t"}}), [path]).conditions[0]) < 0.02
 
 
-@pytest.mark.parametrize("form", ["later", "40:00,5"])
-def test_times_that_are_texts(columns: Columns, tmp_path: Path, form: str) -> None:
-    with pytest.raises(MechanismError, match=rf"has texts, such as '{form}'.*time: {{rate: …}}"):
-        _read(_stamps(columns, lambda t: form), tmp_path, {})
-
-
 UNKNOWN = [("time", "t", "Sekunde"), ("time", "t", "hh:mm:ss"), ("angle", "angle", "Grad"), ("angle", "angle", "mgon")]
 
 
@@ -147,14 +141,3 @@ def test_a_unit_that_is_unknown(columns: Columns, tmp_path: Path, entry: str, co
         _read(columns, tmp_path, changes, names)
     changes[entry]["unit"] = "s" if entry == "time" else "rad"
     assert _read(columns, tmp_path, changes, names).findings == ()
-
-
-def test_rows_of_words_below_the_names(tmp_path: Path) -> None:
-    """A row of units none of which is known is no row of readings, and what stands in it is told as a unit."""
-    path = tmp_path / "a.csv"
-    path.write_text("t;x\nSekunden;Newtonmeter\n0;1,5\n1;2,5\n", encoding="utf-8")
-    found = read_table(path, ["t", "x"]).columns
-    assert found["x"].values.tolist() == [1.5, 2.5]
-    assert (found["t"].unit, found["x"].unit, found["x"].texts) == ("Sekunden", "Newtonmeter", 0)
-    path.write_text("t;x\n0;ERR\n1;2,5\n", encoding="utf-8")
-    assert read_table(path, ["t", "x"]).columns["x"].texts == 1

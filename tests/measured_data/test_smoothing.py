@@ -62,7 +62,7 @@ def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
     table = DataTable({"n": Column(np.floor(true * per_turn), "", 0, "")})
     source = AngleSource(**{"from": "pulses"}, column="n", per_turn=per_turn)
     line = Timeline(time, slice(None), STEP)
-    found = coordinate(source, table, line, None, lambda finding: None).values / (2 * np.pi)
+    found = coordinate(source, table, line, lambda finding: None).values / (2 * np.pi)
     off = (found - true)[2000:-2000] * per_turn
     assert np.std(off) < 0.03
     assert np.ptp(off) < 0.15
@@ -79,13 +79,6 @@ def test_uneven_running_stays() -> None:
     assert np.std(found - true) < np.std(raw - true) / 2
 
 
-def test_pulses_without_errors_stay_as_they_are() -> None:
-    rough = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 1000)) * 1e-3
-    found, spans = smoothed(rough, 1e-6, 60)
-    assert np.array_equal(found, rough)
-    assert not spans.any()
-
-
 @pytest.mark.parametrize("width", [0.2, 0.6])
 def test_an_index_narrower_than_a_sample(width: float) -> None:
     """Seen in some turns only; the edges are right in the mean."""
@@ -94,8 +87,3 @@ def test_an_index_narrower_than_a_sample(width: float) -> None:
     seen = first < true + width * STEP
     edges = seen_edges(first[seen] - 0.5 * STEP, (true[seen][-1] - true[seen][0]) / 0.100013, STEP)
     assert abs(np.mean(edges - true[seen])) < 0.02 * STEP
-
-
-def test_an_index_that_is_seen_in_every_turn_stays() -> None:
-    index = np.arange(1.0, 11.0)
-    assert seen_edges(index, 9.0, STEP) is index

@@ -102,6 +102,6 @@ def test_turns_shorter_than_half_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     """Readings ±½ in turn scatter by ½: row differences of ±1 have √(1/2) = σ, and steps take 1/12 of its square."""
     monkeypatch.setattr(steps, "in_step", lambda *_: 1.0)
     rows, times = np.ones(100, dtype=bool), np.arange(10.0)
-    short: Any = SimpleNamespace(begin=times, end=times + 0.2, line=SimpleNamespace(step=1.0), rows=rows, window=rows)
+    short: Any = SimpleNamespace(begin=times, end=times + 0.2, line=SimpleNamespace(step=1.0), rows=rows)
     left = steps.left_in_turns(short, np.zeros((10, 4)), np.arange(100) % 2 - 0.5, 0.0)
     assert left.noise == pytest.approx((1 / 2 - 1 / 12) ** 0.5, rel=1e-3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from measured_data.recording import codes, mapping, read, recorded
+from measured_data.recording import mapping, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
@@ -90,15 +89,6 @@ def test_shapes_of_text(tmp_path: Path, kind: str) -> None:
     assert found.columns["t"].values.tolist() == [0.0, 1.0]
     assert found.columns["T 1"].values.tolist() == [1.5, -2000.0]
     assert found.columns["T 1"].unit == ("mV" if "units" in kind else "")
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
-def test_names_beyond_ascii(tmp_path: Path, encoding: str) -> None:
-    path = tmp_path / "Prüfstand é.csv"
-    path.write_text("Zeit;Drehmoment µ [N·m]\n0;1,5\n1;2,5\n", encoding=encoding)
-    found = read_table(path, ["Drehmoment µ"]).columns["Drehmoment µ"]
-    assert found.values.tolist() == [1.5, 2.5]
-    assert found.unit == "N·m"
 
 
 def test_numbers_that_are_none(tmp_path: Path) -> None:
@@ -226,22 +216,6 @@ def test_what_is_no_data(tmp_path: Path, kind: str) -> None:
     assert finding.remedy
 
 
-@pytest.mark.parametrize(("name", "extra"), [("a.tdms", "tdms"), ("a.parquet", "parquet"), ("a.nc", "netcdf")])
-def test_package_not_installed(tmp_path: Path, name: str, extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / name).write_bytes(b"")
-    monkeypatch.setattr(importlib.util, "find_spec", lambda package: None)
-    with pytest.raises(MechanismError, match=rf"pip install 'trunnion\[{extra}\]'"):
-        read_table(tmp_path / name, ["t"])
-
-
-@pytest.mark.parametrize("rows", [1, 2, 3])
-def test_a_few_rows(tmp_path: Path, rows: int) -> None:
-    columns = {name: values[:rows] for name, values in recorded(turns=1).items()}
-    with pytest.raises(MechanismError) as failure:
-        read(columns, tmp_path, {"channels/torque-in/zero": 0})
-    assert all(one.file.endswith("run.csv") and one.remedy for one in failure.value.findings)
-
-
 def test_huge_numbers(tmp_path: Path) -> None:
     columns = recorded(turns=4)
     columns["T1"] *= 1e150
@@ -249,16 +223,4 @@ def test_huge_numbers(tmp_path: Path) -> None:
     assert np.isfinite(found.conditions[0].courses["torque-in"].mean).all()
     columns["t"][-1] = 1e308
     with pytest.raises(MechanismError, match=r"from 0 s to 1e\+308 s in steps of 0.0002 s, too many to count"):
-        read(columns, tmp_path)
-
-
-@pytest.mark.parametrize("every", [1, 3])
-def test_a_column_of_text_has_no_values_and_is_told(tmp_path: Path, every: int) -> None:
-    columns = recorded(turns=6)
-    columns["T2"] = [f"{one:.3f} Nm" if k % every == 0 else one for k, one in enumerate(columns["T2"])]
-    found = read(columns, tmp_path)
-    assert "data.readings.missing" in codes(found)
-    assert np.isfinite(found.conditions[0].courses["brake"].turns).any() == (every == 3)
-    columns["encoder"] = ["overflow"] * len(columns["T2"])
-    with pytest.raises(MechanismError, match="has 0 pulses: there are no turns"):
         read(columns, tmp_path)

@@ -85,26 +85,6 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     assert "cannot be read" in err
 
 
-def test_many_files(program: Run, rig: Path, tmp_path: Path) -> None:
-    """Conditions of many files: names that tell them apart, sentences once."""
-    for k in range(3):
-        (tmp_path / f"r{k}.csv").write_text(text_of(recorded(turns=4 + k, seed=k)), "utf-8")
-    code, out, _ = program("data", "rig.json", "r0.csv", "r1.csv", "r2.csv")
-    assert code == 0
-    assert "3 to 5 whole turns in each of 3 conditions" in out
-    assert out.count("zero of torque-in") == 1
-    found = trunnion.rig.read(rig, [tmp_path / "r0.csv", tmp_path / "r0.csv"])
-    assert len({one.name for one in found.conditions}) == 2
-
-
-def test_nothing_was_set(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(text_of(recorded(turns=3)), "utf-8")
-    found = dataset(trunnion.rig.read(mapping(), [tmp_path / "a.csv"]))
-    assert found["set"].shape == (1, 0)
-    trunnion.save(found, tmp_path / "c.csv")
-    assert list(pd.read_csv(tmp_path / "c.csv").columns[:3]) == ["condition", "phase", "torque-in.mean"]
-
-
 def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_path: Path) -> None:
     (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
     (tmp_path / "b.csv").write_bytes((tmp_path / "a.csv").read_bytes())

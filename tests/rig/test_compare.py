@@ -166,24 +166,6 @@ def causes_of(result, channel):
     return {kind: (float(one[f"{kind}_error"]), float(one[f"{kind}_explains"])) for kind in CAUSES}
 
 
-def test_a_wrong_sign_is_a_gain_of_minus_one():
-    result = compare(measured(wrong=wrong_in("torque", np.negative)))
-    assert result.verdict.sel(channel="torque").values == Verdict.NOT
-    assert result.verdict.sel(channel="out").values == Verdict.WITHIN
-    assert result.correlation.sel(channel="torque").values == pytest.approx(-1, abs=1e-4)
-    assert causes_of(result, "torque")["gain"] == pytest.approx((-2.0, 1.0), abs=1e-3)
-    assert np.isnan(list(causes_of(result, "out").values())).all()
-
-
-def test_an_offset_has_its_size():
-    settings = ({"A.speed": 4.0}, {"A.speed": 6.0})
-    result = compare(measured(settings=settings, wrong=wrong_in("torque", lambda true: true + 1.5)))
-    assert (result.verdict.sel(channel="torque").values == Verdict.OFFSET).all()
-    assert result.bias.sel(channel="torque").values == pytest.approx([1.5, 1.5], abs=0.01)
-    assert causes_of(result, "torque")["zero"] == pytest.approx((1.5, 1.0), abs=0.01)
-    assert said(result, "within U in every condition apart from a constant offset", "channels.torque")
-
-
 @pytest.mark.parametrize("gain", [1.05, 10.0, 1e-3])
 def test_a_gain_has_its_size(gain):
     result = compare(measured(wrong=wrong_in("out", lambda course: gain * course), noise=1e-6))
@@ -215,15 +197,6 @@ def test_friction_has_its_size_and_a_model_without_has_none():
     without = compare(data, rocker().with_friction("off"), channels=["torque"])
     assert np.isnan(causes_of(without, "torque")["friction"]).all()
     assert np.isfinite(causes_of(without, "torque")["zero"]).all()
-
-
-def test_other_friction_is_not_put_on_a_sensor():
-    """Whatever it may look like, the remedy names the model too; the efficiency is off."""
-    other = measured(rocker(friction=0.3), channels=POWERS, noise=0.01)
-    result = compare(other)
-    assert result.verdict.sel(channel="torque").values == Verdict.NOT
-    assert result.efficiency_within.values[0] == 0
-    assert said(result, "efficiency", "does not agree within U", "identify")
 
 
 def test_a_driver_at_another_speed_is_named():
@@ -296,18 +269,6 @@ def test_one_turn_is_no_uncertainty():
     assert said(result, "efficiency", "not known in run 1: there is only one turn", "more turns")
 
 
-def test_a_part_of_the_power_is_no_efficiency():
-    """A second useful load that no channel measures is in the model's efficiency, not in the rig's."""
-    mechanism = rocker()
-    data = mechanism.model_dump(exclude_unset=True)
-    data["loads"] = {**data["loads"], "second": {"joint": "D", "resisting_torque": 2.0, "useful": True}}
-    two = trunnion.Mechanism(**data)
-    result = compare(measured(two, channels=POWERS), two)
-    assert "efficiency" not in result
-    assert said(result, "not known in run 1: the power of loads.second is not measured", "warning")
-    assert result.attrs["all_within"] == 1
-
-
 def test_a_timed_cycle_is_the_models():
     """A turn at 4 rad/s lasts π/2 s."""
     whole = measured()
@@ -327,31 +288,6 @@ def test_a_channel_without_a_value_has_nothing_to_compare():
     result = compare(replace(whole, conditions=(replace(condition, courses={**condition.courses, "out": empty}),)))
     assert result.verdict.values.ravel().tolist() == [Verdict.WITHIN, Verdict.NOTHING]
     assert said(result, "channels.out", "not compared")
-
-
-def test_gaps_stay_gaps():
-    whole = measured()
-    condition = whole.conditions[0]
-    turns = condition.courses["torque"].turns.copy()
-    turns[:, 5:9], turns[2, 20] = np.nan, np.nan
-    result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
-    assert np.flatnonzero(np.isnan(result.residual.values[0, 0])).tolist() == [5, 6, 7, 8]
-    assert codes(result) == {Verdict.WITHIN}
-
-
-def test_a_channel_that_one_condition_lacks():
-    whole = measured(settings=({"A.speed": 4.0}, {"A.speed": 6.0}))
-    first = whole.conditions[0]
-    fewer = replace(first, courses={"torque": first.courses["torque"]})
-    result = compare(replace(whole, conditions=(fewer, whole.conditions[1])))
-    assert result.verdict.sel(channel="out").values.tolist() == [Verdict.NOTHING, Verdict.WITHIN]
-    assert result.turns.sel(channel="out").values.tolist() == [0, 8]
-
-
-def test_conditions_may_have_other_positions():
-    one, two = measured(positions=36), measured(positions=24)
-    result = compare(Measurement("bench", (*one.conditions, replace(two.conditions[0], name="few"))))
-    assert np.isfinite(result.phase.values).sum(axis=1).tolist() == [36, 24]
 
 
 @pytest.mark.parametrize(

@@ -124,33 +124,6 @@ def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> 
     assert (folder / f"{kind}.png").stat().st_size > 10_000
 
 
-def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-def]
-    folder: Path, call, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Nor over data by --write; over the model by --write --force only. compare likewise."""
-    shutil.copy(folder / "data" / "run-01.csv", folder / "data.html")
-    shutil.copy(folder / "data" / "mapping.yaml", folder / "data" / "again.yaml")
-    names = ("data/run-01.csv", "data/run-02.csv", "data/mapping.yaml", MODEL, "data.html")
-    before = [(folder / name).read_bytes() for name in names]
-    wanted = ("--parameter", FRICTION)
-    for options in (
-        ("--out", "data/run-01.csv"),
-        ("--write", "data/mapping.yaml"),
-        ("--write", "data/mapping.yaml", "--force"),
-    ):
-        status, text = call(*wanted, *options)
-        assert status == 2, options
-        assert f"'{options[1]}' is read here, and would be written over by {options[0]}" in text
-    assert call(*wanted, "--report", "data.html", "data.html")[0] == 2  # a page is no data file
-    for options in (("--out", "data/run-02.csv"), ("--report", "data.html", "data.html")):
-        monkeypatch.setattr("trunnion.rig.comparison.compare", None)
-        monkeypatch.setattr("sys.argv", ["trunnion", "compare", MODEL, "data/mapping.yaml", *options])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert ended.value.code == 2
-    assert [(folder / name).read_bytes() for name in names] == before
-
-
 @pytest.mark.spread(7)
 @pytest.mark.parametrize(
     ("options", "message"),

@@ -27,7 +27,7 @@ def constant(conditions: Sequence[Array]) -> Fit:
             {"torque": SimpleNamespace(value=np.full(one.shape[1], x[0]), slope=np.ones((1, one.shape[1])))}
             for one in conditions
         ]
-        return SimpleNamespace(said=said)
+        return SimpleNamespace(by_condition=said)
 
     measure = SimpleNamespace(turning=lambda system: False)
     model: Any = SimpleNamespace(
@@ -36,10 +36,7 @@ def constant(conditions: Sequence[Array]) -> Fit:
         measures={"torque": measure},
         run=SimpleNamespace(system=None),
     )
-    blocks = [
-        Block(k, "torque", Signal("torque", "effort:A", "N m", turns), Signal("torque", "effort:A", "N m", turns[:0]))
-        for k, turns in enumerate(conditions)
-    ]
+    blocks = [Block(k, "torque", Signal("torque", "effort:A", "N m", turns)) for k, turns in enumerate(conditions)]
     fit = Fit(Evaluations(model), blocks, [])
     return replace(fit, masks=[np.ones(one.shape[1], bool) for one in conditions], variances=fit.first_scatter())
 

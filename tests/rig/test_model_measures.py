@@ -43,5 +43,7 @@ def test_a_measure_of_every_position_is_a_channel() -> None:
 @pytest.mark.parametrize("name", ["peak", "there", "span", "turn"])
 def test_what_cannot_be_followed_is_named(name: str) -> None:
     """A statistic, a place or a window is no course; an unknown name is answered by the nearest one."""
-    with pytest.raises(MechanismError, match="did you mean 'turned'" if name == "turn" else "the model gives it"):
+    with pytest.raises(
+        MechanismError, match="did you mean 'turned'" if name == "turn" else "no number of a single position"
+    ):
         trunnion.rig.compare(model(), with_channel(name))

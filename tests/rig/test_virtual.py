@@ -211,7 +211,7 @@ def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> Non
         ({"sensors": {"a": {"measures": "rate:D", "per_turn": 60}}}, "sensors.a.per_turn", "changes its sign"),
         ({"schedule": {"conditions": [{"speeed": 1}]}}, "schedule.conditions.0", "speeed"),
         ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,
-          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "no channel measures the angle of A"),
+          "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "nothing measures the angle of A"),
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}}, "encoder", "turn in both directions"),
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}, "encoder": {"per_turn": 60, "kind": "level"}},
          "encoder.kind", "turn in both directions"),
@@ -247,17 +247,6 @@ def test_a_range_is_run_through_once() -> None:
     record = next(found.records())
     assert record.columns["t"][found.cases[0].before] == 0.0
     assert mapping["channels"]["e"]["zero"]["over"][0] == "-1 s"
-
-
-def test_negative_sensitivity_is_read_back(mechanism: Mechanism, seen: Observation, tmp_path: Path) -> None:
-    """Both torques by sensors that read downward: the same courses from the files."""
-    mirrored = {
-        name: one | {"sensitivity": "-100 mV/(N m)"} if name.startswith("T") else one for name, one in SENSORS.items()
-    }
-    down = trunnion.rig.observe(mechanism, rig(sensors=mirrored), seed=4)
-    down.write(tmp_path)
-    read = trunnion.rig.read(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
-    assert read.mean.mean() == pytest.approx(seen.measurement(360).conditions[0].courses["T1"].mean.mean(), abs=0.02)
 
 
 def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None:

@@ -153,11 +153,9 @@ def identify(
     mechanism = model.read()
     with model.lines():
         unknowns, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
-        shares = [float(text) for text in hold_out or () if text.replace(".", "", 1).isdecimal()]
-        held_out = shares[0] if len(shares) == len(hold_out or ()) == 1 else hold_out  # of the turns, or conditions
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         with bar("models evaluated", None) as progress:
-            result = run(mechanism, measurement, unknowns, channel, begin, held_out, guard, progress=progress)
+            result = run(mechanism, measurement, unknowns, channel, begin, hold_out or (), guard, progress=progress)
     others = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
         finding for finding in measurement.findings if finding.severity is not Severity.NOTE or finding.where == "files"
     )

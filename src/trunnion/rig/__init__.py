@@ -10,7 +10,7 @@ from trunnion.lazy import TYPE_CHECKING, loader
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison import compare as compare
-    from trunnion.rig.identification.run import identify as identify
+    from trunnion.rig.identification.identify import identify as identify
     from trunnion.rig.reading.measurement import Measurement as Measurement
     from trunnion.rig.reading.read import read_measured as read
     from trunnion.rig.virtual.observe import Observation as Observation
@@ -20,7 +20,7 @@ _PLACES = {
     "Measurement": ("trunnion.rig.reading.measurement", "Measurement"),
     "Observation": ("trunnion.rig.virtual.observe", "Observation"),
     "compare": ("trunnion.rig.comparison", "compare"),
-    "identify": ("trunnion.rig.identification.run", "identify"),
+    "identify": ("trunnion.rig.identification.identify", "identify"),
     "observe": ("trunnion.rig.virtual.observe", "observe"),
     "read": ("trunnion.rig.reading.read", "read_measured"),
 }

@@ -46,20 +46,12 @@ EFFECT = 0.1  # of a course: what an unknown whose own size says nothing is to c
 
 @dataclass(frozen=True)
 class Block:
-    """One channel in one condition.
-
-    condition: its index; signal, held: with the turns to fit, and with those held out.
-    """
+    """One channel in one condition. condition: its index; held: whether it is not fitted but predicted."""
 
     condition: int
     channel: str
     signal: Signal
-    held: Signal
-
-    @property
-    def data(self) -> Array:
-        """Mean of the turns to fit, or else of those held out, (position,)."""
-        return self.signal.mean if len(self.signal.turns) else self.held.mean
+    held: bool = False
 
     @cached_property
     def spread(self) -> Array:
@@ -212,8 +204,8 @@ class Fit:
 
     @cached_property
     def fitted(self) -> list[int]:
-        """The blocks of which anything is used."""
-        return [k for k, block in enumerate(self.blocks) if len(block.signal.turns)]
+        """The blocks that are not held out."""
+        return [k for k, block in enumerate(self.blocks) if not block.held]
 
     @cached_property
     def start(self) -> Array:
@@ -239,7 +231,7 @@ class Fit:
     def reading(self, x: Array, k: int) -> tuple[Array, Array]:
         """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        modelled, datum = self.courses(x).said[block.condition][block.channel], block.signal.accuracy.datum
+        modelled, datum = self.courses(x).by_condition[block.condition][block.channel], block.signal.accuracy.datum
         value, slope = modelled.value, modelled.slope
         acting = [(s, error.kind, error.sizes[k]) for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]
         zero, gain, angle = (
@@ -256,9 +248,9 @@ class Fit:
             columns[s] = error * shapes[kind]
         return (1 + gain) * (value - datum) + datum + zero, columns
 
-    def gap(self, x: Array, k: int, data: Array | None = None) -> Array:
-        """Data, the mean if not given, less what the sensor would read, (position,); angles by the nearest turn."""
-        gap = (self.blocks[k].signal.mean if data is None else data) - self.reading(x, k)[0]
+    def gap(self, x: Array, k: int) -> Array:
+        """Mean of the turns less what the sensor would read, (position,); angles by the nearest turn."""
+        gap = self.blocks[k].signal.mean - self.reading(x, k)[0]
         turning = self.model.measures[self.blocks[k].channel].turning(self.model.run.system)
         return np.asarray((gap + np.pi) % (2 * np.pi) - np.pi if turning else gap)
 
@@ -286,7 +278,7 @@ class Fit:
         masks, courses = [], self.courses(x)
         for k, block in enumerate(self.blocks):
             status, turned = courses.status[block.condition], courses.turned[block.condition]
-            value = courses.said[block.condition][block.channel].value
+            value = courses.by_condition[block.condition][block.channel].value
             if self.model.measures[block.channel].of_motion:  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
@@ -298,12 +290,14 @@ class Fit:
                 for _ in range(guard - 1):
                     edges = edges | np.roll(edges, 1) | np.roll(edges, -1)
                 good = (status == Status.SOLVED) & ~(edges & (guard > 0))
-            masks.append(good & np.isfinite(block.data) & np.isfinite(value))
+            masks.append(good & np.isfinite(block.signal.mean) & np.isfinite(value))
         return masks
 
     def first_scatter(self) -> list[float]:
         """Variances by the scatter of the turns; a guess where there is none."""
-        return [block.variance if block.repeats else (GUESS * (rms(block.data) or 1.0)) ** 2 for block in self.blocks]
+        return [
+            block.variance if block.repeats else (GUESS * (rms(block.signal.mean) or 1.0)) ** 2 for block in self.blocks
+        ]
 
     def learnt_scatter(self, x: Array) -> list[float]:
         """Variances by channel: of blocks without repetitions by their residuals, of others by how far neighbours of a
@@ -317,7 +311,7 @@ class Fit:
             every = [k for k in self.fitted if self.blocks[k].channel == channel and np.any(self.masks[k])]
             if single := [k for k in every if not self.blocks[k].repeats]:
                 gap = np.concatenate([self.gap(x, k)[self.masks[k]] for k in single])
-                least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].data))) for k in single)) ** 2
+                least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].signal.mean))) for k in single)) ** 2
                 learnt = max(float(np.sum(gap**2)) / max(gap.size - len(x), 1), least, 1e-300)
                 variances = [learnt if k in single else variance for k, variance in enumerate(variances)]
             scores, white = 0.0, 0.0
@@ -429,6 +423,8 @@ def sizes_of(fit: Fit, x: Array) -> Array:
     """How large each unknown is: by the model or the estimate; of one that is 0, what would change the data visibly."""
     sizes = [max(unknown.size, abs(value)) for unknown, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
     pulled = np.linalg.norm(fit.jacobian(x), axis=0)
-    data = float(np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].data) ** 2 * fit.weight(k)) for k in fit.fitted)))
+    data = float(
+        np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].signal.mean) ** 2 * fit.weight(k)) for k in fit.fitted))
+    )
     every = [size or (EFFECT * data / by if by else 1.0) for size, by in zip(sizes, pulled[: fit.count], strict=True)]
     return np.array(every + [1.0] * len(fit.sensors))

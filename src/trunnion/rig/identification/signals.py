@@ -30,7 +30,7 @@ from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
-__all__ = ["Courses", "DriveCycle", "Model", "Parameters", "Said", "Unknown", "described", "limits", "unknowns"]
+__all__ = ["Course", "Courses", "DriveCycle", "Model", "Parameters", "Unknown", "limits", "paths_of", "unknowns"]
 
 Array = NDArray[np.float64]
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
@@ -40,7 +40,7 @@ STEP = 1e-6  # of a number, for what it does to the duration of the cycle
 SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
 
 
-class Said(NamedTuple):
+class Course(NamedTuple):
     """One channel in one condition: values (position,) and their derivatives (unknown, position)."""
 
     value: Array
@@ -64,13 +64,13 @@ class DriveCycle(NamedTuple):
 
 
 class Courses(NamedTuple):
-    """All that the model says at some values of the unknowns.
+    """All that the model has at some values of the unknowns.
 
-    said: by condition, by channel; status: of the positions, by condition; turned: where the sense of a friction or
+    by_condition: by channel; status: of the positions, by condition; turned: where the sense of a friction or
     of a resisting load changes from one position to the next, by condition.
     """
 
-    said: tuple[Mapping[str, Said], ...]
+    by_condition: tuple[Mapping[str, Course], ...]
     status: tuple[NDArray[np.int8], ...]
     turned: tuple[NDArray[np.bool_], ...]
 
@@ -112,7 +112,7 @@ class Model:
 
     def courses(self, at: Array) -> Courses:
         """What the model says at these values of the unknowns, SI."""
-        rows: dict[int, tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = {}
+        rows: dict[int, tuple[Mapping[str, Course], NDArray[np.int8], NDArray[np.bool_]]] = {}
         many, sizes = len(self.unknowns), [len(phase) for phase in self.phases]
         for size in dict.fromkeys(sizes):  # conditions with as many positions as each other, not too many at once
             alike = [k for k, item in enumerate(sizes) if item == size]
@@ -124,7 +124,7 @@ class Model:
                          for name, signal in courses.items()}  # fmt: skip
                 for i, k in enumerate(part):
                     lanes = slice(i * many, (i + 1) * many)
-                    by_channel = {name: Said(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
+                    by_channel = {name: Course(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
                     rows[k] = by_channel, np.max(status[lanes], axis=0), np.any(turned[lanes], axis=0)
         return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
 
@@ -259,7 +259,7 @@ class Model:
 # ---- unknowns --------------------------------------------------------------------------------------------------
 
 
-def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[str, ...]]:
+def paths_of(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[str, ...]]:
     """Paths by the name of the unknown; MechanismError for what means no number, or one that is named twice."""
     groups = parameters if isinstance(parameters, Mapping) else {name: [name] for name in parameters}
     if not groups:
@@ -287,36 +287,36 @@ def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[s
 
 
 def unknowns(
-    mechanism: Mechanism, described: Mapping[str, tuple[str, ...]], start: Mapping[str, float | str]
+    mechanism: Mechanism, paths: Mapping[str, tuple[str, ...]], start: Mapping[str, float | str]
 ) -> list[Unknown]:
     """The unknowns of a mechanism that states all their numbers; start: of some, by name."""
-    if extra := [name for name in start if name not in described]:
+    if extra := [name for name in start if name not in paths]:
         what = f"'{extra[0]}' is not one of the parameters"
-        raise MechanismError(Finding(what, "start", f"they are {', '.join(described)}"))
+        raise MechanismError(Finding(what, "start", f"they are {', '.join(paths)}"))
     values = mechanism.parameters()
     kinds = measured(mechanism, mechanism.parameter_set.entries.values())
     sought, findings = [], []
-    for name, paths in described.items():
+    for name, members in paths.items():
         where = f"parameter {name}"
-        if missing := [path for path in paths if path not in values]:
+        if missing := [path for path in members if path not in values]:
             what = f"{missing[0]} is no number but changes with the motion"
             findings.append(Finding(what, where, "identify a dimension in it"))
             continue
-        units = {"1" if kinds[path].unit == "SI" else kinds[path].unit for path in paths}
+        units = {"1" if kinds[path].unit == "SI" else kinds[path].unit for path in members}
         if len(units) > 1:
             what = f"its numbers are not of one kind: {', '.join(sorted(units))}"
             findings.append(Finding(what, where, "use one parameter for each kind"))
             continue
-        before = tuple(float(np.ravel(values[path])[0]) for path in paths)
-        lows, highs = zip(*(limits(mechanism, path) for path in paths), strict=True)
+        before = tuple(float(np.ravel(values[path])[0]) for path in members)
+        lows, highs = zip(*(limits(mechanism, path) for path in members), strict=True)
         first, lower, upper = float(np.mean(before)), max(lows), min(highs)
         if name in start:
-            numbers = mechanism.with_values({paths[0]: start[name]}).parameters()
-            first = float(np.ravel(numbers[paths[0]])[0])
+            numbers = mechanism.with_values({members[0]: start[name]}).parameters()
+            first = float(np.ravel(numbers[members[0]])[0])
         if not lower <= first <= upper:
             what = f"the start {first:g} is beyond its limits, {lower:g} to {upper:g} (SI)"
             findings.append(Finding(what, where, "give another start"))
-        sought.append(Unknown(name, paths, units.pop(), first, lower, upper, before))
+        sought.append(Unknown(name, members, units.pop(), first, lower, upper, before))
     if findings:
         raise MechanismError(findings)
     return sought

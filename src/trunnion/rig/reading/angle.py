@@ -48,8 +48,8 @@ class Coordinate(NamedTuple):
     cut: float = 0.0
 
 
-def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Array | None, say: Say) -> Coordinate:
-    """The coordinate of the driver by its source; speed: that of the channel, rad/s, of a source `speed`."""
+def coordinate(source: AngleSource, table: DataTable, line: Timeline, say: Say) -> Coordinate:
+    """The coordinate of the driver by its source."""
     index, column = np.empty(0), table.columns.get(source.column or "")
     if source.index is not None:
         index = _edges(line.rows(table.columns[source.index.column].values), line).times
@@ -64,41 +64,12 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
     elif column is not None:
         values = joined(readings * unit_of("angle", str(source.column), column, source.unit, "rad", say)[1])
         angle = Coordinate(values) if source.resolution is None else _in_steps(values, source.resolution.value, line)
-    elif source.speed is not None:
+    else:
+        assert source.speed is not None
         angle = Coordinate(source.speed.value * line.seconds)
         say(f"the angle is that of a constant speed of {source.speed.value:.6g} rad/s")
-    else:
-        angle = Coordinate(_integral(speed, line.seconds))
-        say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
-    values, spoilt = source.sign * angle.values, angle.spoilt
-    if index.size > 1 and source.from_ in ("time", "speed"):
-        values, spoilt = _tied(values, index, line.seconds, say)
-    return Coordinate(values + source.zero.value, spoilt, angle.lag, source.sign * angle.cut)
-
-
-def _integral(speed: Array | None, seconds: Array) -> Array:
-    """What a speed comes to from the first row; where it is missing it is interpolated."""
-    speed = np.full(seconds.size, np.nan) if speed is None else speed
-    finite = np.isfinite(speed)
-    if np.count_nonzero(finite) < 2:
-        return np.full(seconds.size, np.nan)
-    bridged = np.interp(seconds, seconds[finite], speed[finite])
-    return np.concatenate([[0.0], np.cumsum(0.5 * (bridged[1:] + bridged[:-1]) * np.diff(seconds))])
-
-
-def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array, Array]:
-    """An angle stretched between the pulses of an index so that these are a turn apart; not known beyond them."""
-    at = np.interp(index, seconds, values)
-    sense = np.sign(at[-1] - at[0]) or 1.0
-    turns = np.rint(np.diff(at) / TURN * sense)
-    spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
-    if spoilt.size:
-        what = f"{counted(len(spoilt), 'interval')} of the index, {at_times(spoilt[:, 0])}, are not one turn of the "
-        say(warning("index.not_one_turn", "angle.index", what + "angle; left out", "check index pulse and speed"))
-    say("the angle is tied to the index pulse once a turn")
-    exact = TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
-    inside = (seconds >= index[0]) & (seconds <= index[-1])
-    return np.where(inside, sense * np.interp(values * sense, at * sense, exact), np.nan), spoilt
+    values = source.sign * angle.values + source.zero.value
+    return Coordinate(values, angle.spoilt, angle.lag, source.sign * angle.cut)
 
 
 # ---- pulses ---------------------------------------------------------------------------------------------------

@@ -13,13 +13,14 @@ from scipy.ndimage import median_filter
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
+from trunnion.rig.reading.measurement import Signal
 from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.timebase import Say, Timeline, counted, lost, note, runs, unit_of, warning
 from trunnion.rig.reading.turns import Turns, turn_means
 from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
 
 __all__ = [
-    "LOOKED_AT", "WIDTH", "Sensor", "common_drift", "faults", "filtered", "mean_uncertainty", "missing", "noise_of",
+    "LOOKED_AT", "WIDTH", "Sensor", "drift", "faults", "filtered", "mean_uncertainty", "missing", "noise_of",
     "resolution", "sensor_of", "signs", "spikes",
 ]  # fmt: skip
 
@@ -252,17 +253,14 @@ def _clipped(where: str, readings: Array, limit: float, unit: str, seconds: Arra
     return finding if rows.any() else None
 
 
-def faults(
-    where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], width: int, moves: bool
-) -> Iterator[Finding]:
+def faults(where: str, readings: Array, turns: Turns, near: slice, moves: bool) -> Iterator[Finding]:
     """Stuck readings and spikes while the drive runs, which become NaN; what half of the turns have is the signal's.
 
-    turns: when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal. width: rows before
-    and after the turns that reach into them, by interpolation or a filter. moves: whether the readings are to change.
+    With fewer turns than `FEW` nothing tells a fault from the signal. near: rows that reach into the turns, by
+    interpolation or a filter; moves: whether the readings are to change.
     """
-    begin, end = turns
-    first, last = int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right"))
-    running, near = slice(first, last), slice(max(first - width, 0), last + width)
+    seconds, begin, end = turns.line.seconds, turns.begin, turns.end
+    running = slice(int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right")))
     finite = readings[running][np.isfinite(readings[running])]
     if finite.size >= 10 and finite.min() == finite.max():
         what = f"reads {finite[0]:.6g} in every one of {finite.size:,} rows"
@@ -270,9 +268,10 @@ def faults(
     elif finite.size >= 10:
         for kind, rows, check in (("stuck", running, _stuck), ("spikes", near, spikes)):
             mask = check(readings[rows])
+            often = runs(mask)[0].size >= 0.5 * begin.size
             if kind == "spikes":
                 mask[np.flatnonzero(mask)[_returning(seconds[rows][mask], begin, end)]] = False
-            if begin.size >= FEW and mask.any() and runs(mask)[0].size < 0.5 * begin.size:
+            if begin.size >= FEW and mask.any() and not often:
                 readings[rows][mask] = np.nan
                 what = lost(kind, mask, seconds[rows])
                 yield warning(f"readings.{kind}", where, what, "check sensor, shielding and logger")
@@ -319,55 +318,46 @@ def spikes(part: Array) -> Mask:
 # ---- turns ----------------------------------------------------------------------------------------------------
 
 
-def common_drift(parts: Sequence[tuple[Turns, Array]], unit: str) -> tuple[float, float, str]:
-    """A zero that creeps: the slope that the means of turns have in common in all conditions of a file.
+def drift(turns: Turns, course: Array, unit: str) -> tuple[float, float, str]:
+    """A zero that creeps: the slope of the means of the turns, where it is plain.
 
     Returns
     -------
     Slope, SI a second; standard uncertainty of the line at either end; a sentence, empty where the slope is not plain.
     """
-    rows, largest = [np.empty((3, 0))], 0.0
-    for turns, course in parts:
-        mean, middle = turn_means(course), 0.5 * (turns.begin + turns.end)
-        finite = np.isfinite(mean)
-        if np.count_nonzero(finite) >= 3:
-            mean, middle = mean[finite], middle[finite]
-            rows.append(np.stack([middle, middle - middle.mean(), mean - mean.mean()]))
-            largest = max(largest, float(np.nanmax(np.abs(course))))
-    middle, t, y = np.concatenate(rows, axis=1)
-    free, square = t.size - len(rows), float(np.sum(t**2))
-    if free < 4 or square == 0:
+    mean, middle = turn_means(course), 0.5 * (turns.begin + turns.end)
+    finite = np.isfinite(mean)
+    mean, middle, free = mean[finite], middle[finite], np.count_nonzero(finite) - 2
+    if free < 4:
         return 0.0, 0.0, ""
-    slope, span = float(np.sum(t * y)) / square, float(np.ptp(middle))
+    t, y, span = middle - middle.mean(), mean - mean.mean(), float(np.ptp(middle))
+    slope = float(np.sum(t * y)) / (square := float(np.sum(t**2)))
     scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
-    error, change = scatter / np.sqrt(square), slope * span
+    error, change, largest = scatter / np.sqrt(square), slope * span, float(np.nanmax(np.abs(course)))
     if not change or abs(slope) < CERTAIN * error or abs(change) < max(PLAIN * scatter, SHARE * largest):
         return 0.0, 0.0, ""
     what = f"drift: the mean of a turn changes by {change:.3g} {unit} in {span:.4g} s, "
     return slope, error * span / 2, f"{what}{abs(change) / max(scatter, 1e-300):.3g} times the scatter of the turns"
 
 
-def signs(
-    sensors: Mapping[str, Sensor], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
-) -> Iterator[Finding]:
+def signs(sensors: Mapping[str, Sensor], signals: Mapping[str, Signal], turning: float) -> Iterator[Finding]:
     """Channels that are likely to have the wrong sign or unit: a speed of the driver that is not that of the angle, a
-    power into a driver or out at a load below zero in nearly all turns of a file.
+    power into a driver or out at a load below zero in nearly all turns, by more than the zero may be off.
 
-    courses: turns of all conditions; zeros: standard uncertainty of the zero of each channel, SI, within which the mean
-    of a power shows no sign; turning: mean speed of the driver by its angle, rad/s with its sign.
+    turning: mean speed of the driver by its angle, rad/s with its sign.
     """
     subjects: dict[str, dict[str, str]] = {"rate": {}, "effort": {}, "load": {}}
-    for name, sensor in sensors.items():
-        kind, _, subject = sensor.channel.measures.partition(":")
+    for name, signal in signals.items():
+        kind, _, subject = signal.measures.partition(":")
         subjects.get(kind, {})[subject] = name
     rates, drivers, loads = subjects.values()
     free, ratio = [name for joint, name in rates.items() if joint not in drivers], 1.0
     rate = rates.get(next(iter(drivers))) if len(drivers) == 1 and turning else None
-    if rate and (speed := courses[rate][np.isfinite(courses[rate])]).size:
+    if rate and (speed := signals[rate].turns[np.isfinite(signals[rate].turns)]).size:
         one_way = np.all(speed * speed[0] > 0)  # over equal angles its mean in time is the harmonic one
         ratio = turning / (float(1 / np.mean(1 / speed)) if one_way else float(np.mean(speed)))
         if abs(ratio - 1) > APART:
-            unit, size = sensors[rate].read_in if sensors[rate].read_in[0] else (sensors[rate].scale.unit, 1.0)
+            unit, size = signals[rate].shown
             what = f"the angle turns at {turning / size:.4g} {unit}, {ratio:.4g} times what '{rate}' reads"
             remedy = f"write sign: {-sensors[rate].channel.sign}, or correct unit and gain, or per_turn of angle"
             yield warning("rate.ratio", f"channels.{rate}", what, remedy)
@@ -376,13 +366,14 @@ def signs(
     if abs(ratio + 1) > APART:  # else that explains it
         pairs += [(name, rates.get(driver)) for driver, name in drivers.items() if len(drivers) < 2 or driver in rates]
     for name, rate in pairs:
-        speed = courses[rate] if rate else np.full_like(courses[name], turning)
-        power = turn_means(courses[name] * speed)
+        effort = signals[name]
+        speed = signals[rate].turns if rate else np.full_like(effort.turns, turning)
+        power = turn_means(effort.turns * speed)
         power = power[np.isfinite(power)]
         below = int(np.count_nonzero(power < 0))
-        plain = power.size and abs(np.mean(power)) > 2 * abs(zeros[name] * float(np.nanmean(speed)))
+        plain = power.size and abs(np.mean(power)) > 2 * abs(effort.accuracy.zero * float(np.nanmean(speed)))
         if plain and below > NEARLY_ALL * power.size:
-            channel = sensors[name].channel
-            what = f"sign: the power of {channel.measures} is negative in {below:,} of {counted(power.size, 'turn')} "
-            remedy = f"write sign: {-channel.sign}, or turn the speed or sign: in angle:, if that is wrong"
+            what = f"sign: the power of {effort.measures} is negative in {below:,} of {counted(power.size, 'turn')} "
+            sign = -sensors[name].channel.sign
+            remedy = f"write sign: {sign}, or turn the speed or sign: in angle:, if that is wrong"
             yield warning("power.sign", f"channels.{name}", f"{what}({power.mean():.4g} W)", remedy)

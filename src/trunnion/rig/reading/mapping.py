@@ -24,7 +24,7 @@ from trunnion.model.units import UnitError
 from trunnion.rig.reading import units
 
 __all__ = [
-    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FromData", "Mapped", "Pulses", "TimeBase",
+    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "Mapped", "Mean", "Pulses", "TimeBase",
     "Zero", "read_mapping", "schema_text",
 ]  # fmt: skip
 
@@ -49,25 +49,16 @@ Span = Annotated[tuple[units.Time, units.Time], AfterValidator(_ordered)]
 _PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
 
 
-class FromData(Part):
-    """A value that the data tell: the mean of a channel over the turns, of the speed by the angle with `mean: angle`
-    where no channel has that name, or a column that states it."""
+class Mean(Part):
+    """A value that the data tell: the mean of a channel over the turns; of the speed by the angle with `mean: angle`
+    where no channel has that name."""
 
-    mean: str | None = None
-    column: str | None = None
-    unit: units.UnitText | None = None
-
-    @model_validator(mode="after")
-    def _single(self) -> FromData:
-        if (self.mean is None) == (self.column is None) or (self.mean is not None and self.unit is not None):
-            what = "a value is taken from one of mean and column, and a mean has the unit of its channel"
-            raise problem(what, "write {mean: channel} or {column: name, unit: deg}")
-        return self
+    mean: str
 
 
 Setting = Annotated[
-    Annotated[FromData, Tag(":group")] | Annotated[units.Number, Tag(":value")],
-    forms("a number with its unit, {mean: channel} or {column: name, unit: deg}"),
+    Annotated[Mean, Tag(":group")] | Annotated[units.Number, Tag(":value")],
+    forms("a number with its unit, or {mean: channel}"),
 ]
 
 
@@ -95,23 +86,21 @@ class Index(Part):
 # keys that each source of the angle needs, and those it may have
 _KEYS = {
     "pulses": (("column", "per_turn"), ("kind", "wrap", "index")),
-    "column": (("column",), ("unit", "index", "resolution")),
-    "time": (("speed",), ("index",)),
-    "speed": (("channel",), ("index",)),
+    "column": (("column",), ("unit", "resolution")),
+    "time": (("speed",), ()),
 }
 
 
 class AngleSource(Part):
     """Where the coordinate of the driver comes from."""
 
-    from_: Literal["pulses", "column", "time", "speed"] = Field(alias="from")
+    from_: Literal["pulses", "column", "time"] = Field(alias="from")
     column: str | None = None
     unit: units.AngleUnit | None = None
     per_turn: Pulses | None = None
     kind: Literal["count", "level"] | None = None
     wrap: Annotated[int, Field(ge=2)] | None = None
     speed: units.AngularSpeed | None = None
-    channel: str | None = None
     zero: units.Angle = units.ZERO
     index: Index | None = None
     sign: Sign = 1
@@ -158,18 +147,7 @@ class Accuracies(Part):
     zero: units.Size = units.ZERO
 
 
-class FileChannel(Part):
-    """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
-
-    unit: units.UnitText | None = None
-    gain: units.Number | None = None
-    zero: ChannelZero = units.ZERO
-    range: units.Positive | None = None
-    resolution: units.Positive | None = None
-    accuracy: Accuracies = Accuracies()
-
-
-class Channel(FileChannel):
+class Channel(Part):
     """A column that measures something of the model, and how its readings become that.
 
     Quantity = sign · (reading − zero) · gain, or / gain, as its unit tells. per_turn: pulses of a speed that is worked
@@ -178,7 +156,13 @@ class Channel(FileChannel):
 
     column: str
     measures: units.MeasureText
+    unit: units.UnitText | None = None
+    gain: units.Number | None = None
     sign: Sign = 1
+    zero: ChannelZero = units.ZERO
+    range: units.Positive | None = None
+    resolution: units.Positive | None = None
+    accuracy: Accuracies = Accuracies()
     per_turn: Pulses | None = None
 
     @model_validator(mode="after")
@@ -201,15 +185,6 @@ class Channel(FileChannel):
                 scale.reading(amount, key)
         return scale
 
-    def changed(self, of_file: FileChannel | None) -> Channel:
-        """The channel as it is in a file; UnitError if what the file states does not go with it."""
-        if of_file is None:
-            return self
-        channel = self.model_copy(update={key: getattr(of_file, key) for key in of_file.model_fields_set})
-        if channel.unit is not None:
-            channel.scale(channel.unit)
-        return channel
-
 
 class FileAngle(Part):
     """The angle in one data file: its zero, in place of that of `angle`."""
@@ -218,13 +193,12 @@ class FileAngle(Part):
 
 
 class File(Part):
-    """A data file, what was set while it was recorded, the time of it that is used, its zero of the angle, channels."""
+    """A data file, what was set while it was recorded, the time of it that is used, its zero of the angle."""
 
     file: str = Field(min_length=1)
     set: Mapping[str, Setting] = {}
     over: Span | None = None
     angle: FileAngle | None = None
-    channels: Mapping[Name, FileChannel] = {}
 
 
 class Filter(Part):
@@ -260,9 +234,8 @@ class DataMapping(Part):
     drift: Literal["report", "remove"] = "report"
 
     def of_file(self, entry: File) -> DataMapping:
-        """The same with what a file states of its own angle, its own channels, and what was set."""
-        channels = {name: channel.changed(entry.channels.get(name)) for name, channel in self.channels.items()}
-        changes: dict[str, Any] = {"channels": channels, "set": {**self.set, **entry.set}}
+        """The same with what a file states of its own angle, and what was set."""
+        changes: dict[str, Any] = {"set": {**self.set, **entry.set}}
         if entry.angle is not None and self.angle is not None:
             changes["angle"] = self.angle.model_copy(update={"zero": entry.angle.zero})
         return self.model_copy(update=changes)
@@ -328,19 +301,13 @@ def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
 
 def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
     """What an entry alone cannot tell: names of channels, the cycle, entries of files that do not fit the mapping."""
-    channels, angle = mapping.channels, mapping.angle
-    sources = [*channels, *(["angle"] if angle else [])]  # the mean speed by the angle
+    angle = mapping.angle
+    sources = [*mapping.channels, *(["angle"] if angle else [])]  # the mean speed by the angle
     settings = {"set": mapping.set} | {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
     named = {f"{key}.{name}.mean": value.mean for key, values in settings.items() for name, value in values.items()
-             if isinstance(value, FromData) and value.mean is not None}  # fmt: skip
-    named |= {f"files.{k}.channels.{name}": name for k, file in enumerate(mapping.files) for name in file.channels}
-    if angle is not None and angle.channel is not None:
-        named["angle.channel"] = angle.channel
-        if angle.channel in channels and not channels[angle.channel].measures.startswith("rate:"):
-            what = f"the channel '{angle.channel}' measures {channels[angle.channel].measures}, not a speed"
-            yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
+             if isinstance(value, Mean)}  # fmt: skip
     for where, name in named.items():
-        if name not in (sources if where.endswith(".mean") else channels):
+        if name not in sources:
             yield Finding(f"there is no channel '{name}'", where, nearest(name, sources))
     if angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
@@ -352,11 +319,6 @@ def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
         if file.angle is not None and angle is None:
             what = "states a zero of the angle, but no column gives an angle"
             yield Finding(what, f"files.{k}.angle", "add angle: {from: …}, or remove it")
-        for name in file.channels.keys() & channels.keys():
-            try:
-                channels[name].changed(file.channels[name])
-            except UnitError as error:
-                yield Finding(error.what, f"files.{k}.channels.{name}", error.remedy)
 
 
 def _inside(name: str, folder: Path) -> bool:

@@ -48,7 +48,7 @@ def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) ->
     share, samples = in_step(turns, course), float(np.median(turns.end - turns.begin)) / turns.line.step
     every = share > ALIKE
     if every:  # then what a reading differs by from that a turn later is noise
-        rows = np.where(turns.rows, readings[turns.window], np.nan)
+        rows = np.where(turns.rows, readings, np.nan)
         later = max(round(samples), 1)  # the next row, where a turn is shorter than half a row
         apart = rows[later:] - rows[:-later]
         apart = apart[np.isfinite(apart)]

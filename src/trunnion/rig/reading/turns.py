@@ -6,7 +6,7 @@ to the position along the slope there; with fewer it is interpolated by a cubic 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,10 @@ APART = 0.5  # of the usual length of a turn, by which one may differ from it
 
 @dataclass(frozen=True)
 class Turns:
-    """Whole turns of one condition in a file, among the rows of a window.
+    """Whole turns of a file.
 
-    share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin,
-    end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows.
+    share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
+    times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows.
     """
 
     share: Array
@@ -38,7 +38,6 @@ class Turns:
     rows: Mask
     positions: int
     line: Timeline
-    window: slice
 
     @property
     def density(self) -> float:
@@ -52,18 +51,13 @@ class Turns:
         return np.flatnonzero(self.share > np.concatenate([[-np.inf], highest[:-1]]))
 
 
-def cut(
-    shares: Array, times: Timeline, of: Mask, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str
-) -> Turns:
-    """Find the whole turns of a condition.
+def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, say: Say) -> Turns:
+    """Find the whole turns of a file.
 
-    shares: cycles gone through, rising with time, NaN where not known, (row,); times: of the rows; of: rows of the
-    condition; allowed: those that may be used; positions: of a turn; spoilt: stretches of time to leave out, (stretch,
-    2); say: takes findings about turns that are left out; where: what these are about.
+    share: cycles gone through, rising with time, NaN where not known, (row,); line: time of the rows; allowed: rows
+    that may be used; positions: of a turn; spoilt: stretches of time to leave out, (stretch, 2); say: takes findings
+    about turns that are left out.
     """
-    rows = np.flatnonzero(of)  # the rest is not looked at: a file may have hundreds of conditions
-    window = slice(int(rows[0]), int(rows[-1]) + 1)
-    share, line, allowed = shares[window], replace(times, seconds=times.seconds[window]), (allowed & of)[window]
     begin, end, numbers = _whole(share, line)
     refused = np.concatenate([[0], np.cumsum(~allowed)])
     low, high = (np.searchsorted(line.seconds, edge) for edge in (begin + 0.5 * line.step, end - 0.5 * line.step))
@@ -75,14 +69,14 @@ def cut(
         left_out = int(np.sum(np.maximum(np.rint(lengths[odd] / usual), 1)))  # over a gap it may be several
         span = f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
         what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
-        say(note("turns.unusual", where, what, "the drive starts, stops or rests there, or rows are missing"))
+        say(note("turns.unusual", "turns", what, "the drive starts, stops or rests there, or rows are missing"))
     good = ~odd
     for low, high in spoilt:
         slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
         good &= (begin > high - slack) | (end < low + slack)
     begin, end = begin[good], end[good]
     moving = _rows_of(share, begin, end, line, allowed, positions)
-    return Turns(share, numbers[good], begin, end, moving, positions, line, window)
+    return Turns(share, numbers[good], begin, end, moving, positions, line)
 
 
 def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -135,8 +129,7 @@ def resampled(turns: Turns, channel: Array, angle: Array | None = None) -> Array
     """
     if not turns.numbers.size:
         return np.empty((0, turns.positions))
-    values = channel[turns.window]
-    course = _averaged(turns, values) if turns.density >= DENSE else _interpolated(turns, values)
+    course = _averaged(turns, channel) if turns.density >= DENSE else _interpolated(turns, channel)
     if angle is None or not np.isfinite(course).any():
         return course
     raw, first = resampled(turns, angle), int(np.argmax(np.count_nonzero(np.isfinite(course), axis=1)))

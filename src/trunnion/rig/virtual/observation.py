@@ -223,7 +223,7 @@ class Observation:
     def mapping(self, form: str = "") -> dict[str, Any]:
         """The mapping that reads the files: what a laboratory knows, and no more than that."""
         case, encoder = self.cases[0], self.rig.encoder
-        timed = not case.named or (encoder is None and not differ_in_speed(self.cases))
+        timed = encoder is None or not case.named
         entries = []
         for item in self.cases:
             entry: dict[str, Any] = {"file": f"{item.name}.{form or self.rig.format}"}
@@ -348,12 +348,6 @@ def _angle(observation: Observation) -> dict[str, Any]:
             source["zero"] = _degrees(zero)
         if encoder.index:
             source["index"] = {"column": encoder.index}
-    elif differ_in_speed(observation.cases):
-        channels = observation.channels.items()
-        speed = next(name for name, channel in channels if channel.sensor.measures == f"rate:{case.driver}")
-        source = {"from": "speed", "channel": speed}
-        if case.start[0]:
-            source["zero"] = _degrees(case.start[0])
     else:
         angle, rate = (float(item.flat[0]) for item in case.drive(-case.before))
         source = {"from": "time", "speed": f"{rate:.15g} rad/s", "zero": _degrees(angle)}

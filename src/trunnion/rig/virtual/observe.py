@@ -247,10 +247,9 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
         what = "the conditions turn in both directions, which only a count of pulses shows"
         remedy = "state an encoder of kind: count, or one rig for each direction"
         yield Finding.error("rig.both_ways", "encoder.kind" if level else "encoder", what, remedy)
-    measured = {channel.sensor.measures for channel in channels.values()}
-    if not encoder and differ_in_speed(sound) and f"rate:{driver}" not in measured:
-        what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
-        yield Finding.error("rig.no_angle", "encoder", what, f"state an encoder, or a sensor of rate:{driver}")
+    if not encoder and differ_in_speed(sound):
+        what = f"the conditions differ in speed, and nothing measures the angle of {driver}"
+        yield Finding.error("rig.no_angle", "encoder", what, "state an encoder")
     for i, (name, channel) in enumerate(channels.items()):
         highest = {case.number: float(np.max(np.abs(case.true[i]))) for case in sound}
         if clipped := [case for case in sound if highest[case.number] > channel.limit]:

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part
-from trunnion.model.expression import LITERAL
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
-from trunnion.model.units import normalise
 from trunnion.rig.reading import units
 from trunnion.rig.reading.mapping import Accuracies, Pulses
 
@@ -156,19 +154,17 @@ def _spread(entry: str, where: str) -> list[Value]:
     parts = [part.strip() for part in entry.split(":")]
     if len(parts) == 1:
         return [entry]
-    ends = [LITERAL.fullmatch(normalise(part).removeprefix("-").strip()) for part in parts[:2]]
-    unit = [(end["unit"] or end["per"] or "") if end else "" for end in ends]
-    numbers = [
-        (-1 if normalise(part).startswith("-") else 1) * Fraction(end["number"])
-        for part, end in zip(parts, ends, strict=False) if end
-    ]  # fmt: skip
-    count = int(parts[2]) if len(parts) == 3 and parts[2].isdigit() else 0
-    if not 2 <= count <= MOST_VALUES or len(numbers) < 2 or (unit[0] != unit[1] and all(numbers)):
+    try:
+        low, high = (units.read_amount(part) for part in parts[:2])
+        unit, count = low.unit or high.unit, int(parts[2])
+        if not 2 <= count <= MOST_VALUES or len(parts) > 3 or (low.unit != high.unit and low.value and high.value):
+            raise ValueError
+    except (ValueError, IndexError):
         remedy = "write FROM:TO:COUNT with the same unit at both ends, such as 0 deg:30 deg:7, or a list"
-        raise MechanismError(Finding(f"'{entry}' is no range", where, remedy))
-    (low, high), last = numbers, count - 1
-    values = [float((low * (last - k) + high * k) / last) for k in range(count)]
-    return [f"{value:.12g} {unit[0] or unit[1]}" if any(unit) else value for value in values]
+        raise MechanismError(Finding(f"'{entry}' is no range", where, remedy)) from None
+    factor = units.dimensions(unit)[0] if unit else 1.0
+    texts = [f"{value:.12g}" for value in np.linspace(low.value / factor, high.value / factor, count)]
+    return [f"{text} {unit}" if unit else float(text) for text in texts]
 
 
 def _unsound(rig: Rig) -> Iterable[Finding]:

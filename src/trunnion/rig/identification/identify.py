@@ -1,0 +1,631 @@
+"""`identify`: numbers of a model from measurements by least squares, with what they are worth; as a Dataset, and in the
+model.
+
+Settings of the conditions and paths of the unknowns → one prepared model → blocks of data → fit → covariances → result.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import product
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.summary import inputs, references
+from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.measures.measures import Measure
+from trunnion.model.arguments import strict_arguments
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import attribute, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.quantities import decimals, with_uncertainty
+from trunnion.rig.comparison import data_findings, hashed_files, other_speed, written_unit
+from trunnion.rig.identification.fit import (
+    FAR,
+    Block,
+    Evaluations,
+    Fit,
+    Solution,
+    refined,
+    sensor_errors,
+    shared_zero,
+    sizes_of,
+    solved,
+)  # fmt: skip
+from trunnion.rig.identification.signals import DriveCycle, Model, Parameters, paths_of, unknowns
+from trunnion.rig.identification.uncertainty import (
+    CONFIDENCE,
+    Covariances,
+    inseparable,
+    lack_of_fit,
+    quantile,
+    spread_of,
+)  # fmt: skip
+from trunnion.rig.modelled import each, in_condition, measure_of, refuse_unit, same_cycle
+from trunnion.rig.reading.measurement import Condition, Measurement, rms
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["VARIABLES", "identify", "with_estimates"]
+
+Array = NDArray[np.float64]
+SOURCES = (
+    "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
+    "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
+)
+NOTHING = 1e-9  # of a course: what an unknown does to it
+MOST_NAMED = 6  # conditions in a message
+HALVINGS = 8  # of a friction that locks at the start
+NEAR_LIMIT = 0.98  # of the most that a stated error may come to
+AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
+MUCH = 3.0  # times what scatter explains, between conditions
+POOR = 2.0  # times what is expected, of predictions
+UNEXPLAINED = 0.2  # of a misfit: what is left if an error explains it
+OFF = 3.0  # standard uncertainties from what was stated of a sensor
+
+PARAMETER, SENSOR, BLOCK = ("parameter",), ("sensor",), ("channel", "condition")
+COURSE = (*BLOCK, "position")
+VARIABLES = {
+    "start": Variable(PARAMETER, "of the parameter", "start of the search"),
+    "estimate": Variable(PARAMETER, "of the parameter", "estimate; NaN if not identifiable"),
+    "standard_uncertainty": Variable(PARAMETER, "of the parameter", "standard uncertainty of the estimate"),
+    "lower": Variable(PARAMETER, "of the parameter", "lower end of the 95 % interval"),
+    "upper": Variable(PARAMETER, "of the parameter", "upper end of the 95 % interval"),
+    "degrees_of_freedom": Variable(PARAMETER, "1", "effective degrees of freedom of the standard uncertainty"),
+    "limit": Variable(PARAMETER, "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
+    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not, or if the interval is wider than the value itself"),
+    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
+    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
+    "singular_value": Variable(PARAMETER, "1", "singular value of the derivatives, columns scaled to 1; largest first"),
+    "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_size": Variable(
+        SENSOR, "of the sensor", "stated standard uncertainty, of the angle rad; NaN if it differs"
+    ),
+    "sensor_uncertainty": Variable(SENSOR, "1", "standard uncertainty of that, in those stated"),
+    "rms_before": Variable(BLOCK, "of the channel", "root mean square of the residual at the start"),
+    "rms_after": Variable(BLOCK, "of the channel", "root mean square of the residual with the estimates"),
+    "rms_expected": Variable(BLOCK, "of the channel", "its expected value from the scatter between turns"),
+    "used": Variable(BLOCK, "1", "positions used", np.int32),
+    "left_out": Variable(BLOCK, "1", "positions with data that are not used", np.int32),
+    "turns": Variable(BLOCK, "1", "turns used", np.int32),
+    "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
+    "held_out_before": Variable(BLOCK, "of the channel", "rms of the residual of the held-out data, at the start"),
+    "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
+    "held_out_expected": Variable(BLOCK, "of the channel", "its expected value, by scatter and prediction"),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of the contributions of successive turns"),
+    "hold_out_ratio": Variable((), "1", "residuals of the held-out data over their expected value"),
+    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
+    "measured": Variable(COURSE, "of the channel", "mean over the turns"),
+    "residual_before": Variable(COURSE, "of the channel", "measured minus model, at the start"),
+    "residual_after": Variable(COURSE, "of the channel", "measured value minus predicted reading of the sensor"),
+    "residual_uncertainty": Variable(COURSE, "of the channel", "standard uncertainty of the mean over the turns"),
+}
+
+
+@strict_arguments
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
+def identify(
+    mechanism: Mechanism,
+    measurement: Measurement,
+    parameters: Parameters,
+    channels: Sequence[str] | None = None,
+    start: Mapping[str, float | str] | None = None,
+    hold_out: Sequence[str] = (),
+    guard: int | None = None,
+    friction_method: FrictionMethod | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Identify numbers of a mechanism, with 95 % intervals, correlation, and what cannot be told apart.
+
+    Weighted least squares with exact derivatives by a trust region; covariances by the scatter between turns.
+
+    Parameters
+    ----------
+    mechanism : the model.
+    measurement : as `rig.read` or `rig.observe` has it.
+    parameters : names as for `Mechanism.with_values`, each an unknown; or by a name of your own the numbers that are to
+        be one unknown: `{"pins": ["pin-1.friction.coefficient", "pin-2.friction.coefficient"]}`.
+    channels : of the measurement; all that an unknown acts on if not given.
+    start : where the search begins, by name, SI or texts with units; the model's values if not given.
+    hold_out : conditions by name, file or setting, that are not fitted but predicted.
+    guard : positions left out on each side where the sense of a friction changes; one for every 90 of a cycle if not
+        given.
+    friction_method : how friction and reactions are settled; Newton's method if not given.
+    progress : called with the number of models evaluated.
+
+    Returns
+    -------
+    Dataset with the estimates by parameter, errors of the sensors, and residuals by channel, condition and position.
+
+    Raises
+    ------
+    MechanismError
+        For names, channels or conditions that are not there, or where the model has no answer.
+    """
+    if guard is not None and guard < 0:
+        raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
+    conditions = measurement.conditions
+    each(conditions, partial(in_condition, mechanism))
+    paths = paths_of(mechanism, parameters)
+    mechanism, settings = _with_settings(mechanism, conditions, paths, start or {})
+    run = prepare(mechanism)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    blocks = _blocks(measurement, channels, hold_out)
+    if follow := [seat.joint for seat in run.seats if seat.given is None]:
+        what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
+        raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
+    phases = tuple(np.asarray(condition.phase, float) for condition in conditions)
+    sought, measures = tuple(unknowns(mechanism, paths, start or {})), _measures(mechanism, run, blocks)
+    model = Model(run, sought, measures, settings, phases, friction_method or FrictionMethod())
+    if channels is None:
+        model = replace(model, measures=_acted_on(model))
+        blocks = [block for block in blocks if block.channel in model.measures]
+    encoder = f"drivers.{next(iter(mechanism.drivers), '')}.start"  # an unknown of data that state an angle
+    starts = [condition.start for condition in conditions]
+    if not (any(encoder in unknown.paths for unknown in sought) and np.isfinite(starts).any()):
+        encoder = ""
+    at = np.array([unknown.before[0] if encoder in unknown.paths else unknown.start for unknown in sought])
+
+    def check(k: int) -> None:
+        cycle = model.cycle(k, at)
+        same_cycle(run, conditions[k], model.cycles[k].duration, cycle.begin, cycle.turn)
+
+    each(range(len(conditions)), check)
+    errors = sensor_errors(model, conditions, blocks)
+    fit = Fit(Evaluations(model, progress or (lambda count: None)), blocks, errors, guard)
+    fit, best = refined(fit, _runnable(fit))
+    spread = spread_of(fit, best.x)
+    if spread.excess > 1 and fit.sensors:
+        fit = replace(fit, inflation=spread.excess)
+        best = best._replace(x=solved(fit, best.x).x)
+        spread = spread_of(fit, best.x)
+    return _Identified(mechanism, measurement, fit, best, spread, encoder).dataset()
+
+
+# ---- the data and the model -----------------------------------------------------------------------------------
+
+
+def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: Sequence[str]) -> list[Block]:
+    """One for each channel in each condition; all channels if none is named.
+
+    hold_out: conditions by name, by a setting or its value in it, or by file. MechanismError for what names none.
+    """
+    conditions, held = measurement.conditions, set[int]()
+    every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
+    if not every:
+        raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
+    if missing := [name for name in channels or () if name not in every]:
+        remedy = f"the measurement has {', '.join(every)}"
+        raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "channels", remedy))
+    for text in [hold_out] if isinstance(hold_out, str) else hold_out:
+        named = {k for k, condition in enumerate(conditions) if _plain(text) in _names(condition)}
+        if not named:
+            names = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
+            remedy = f"name one of {names}{'; …' * (len(conditions) > MOST_NAMED)}; or a file, or NAME=VALUE"
+            raise MechanismError(Finding(f"there is no condition '{text}'", "hold_out", remedy))
+        held |= named
+    if len(held) == len(conditions):
+        raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
+    blocks = []
+    for (k, condition), channel in product(enumerate(conditions), every if channels is None else channels):
+        if (signal := condition.courses.get(channel)) is not None:
+            turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
+            blocks.append(Block(k, channel, replace(signal, turns=turns), k in held))
+    return blocks
+
+
+def _plain(text: str) -> str:
+    """A name or a setting, NAME=VALUE or NAME VALUE, without what may be written otherwise."""
+    return re.sub(r"[\s=]", "", text)
+
+
+def _names(condition: Condition) -> set[str]:
+    """What a condition may be named by."""
+    files, settings = [PurePath(file) for file in condition.files], condition.name.split(", ")
+    values = [setting.partition(" ")[2] for setting in settings]
+    names = [condition.name, *settings, *values, *(file.name for file in files), *(file.stem for file in files)]
+    return {_plain(name) for name in names} - {""}
+
+
+def _with_settings(
+    mechanism: Mechanism,
+    conditions: Sequence[Condition],
+    paths: Mapping[str, Sequence[str]],
+    start: Mapping[str, float | str],
+) -> tuple[Mechanism, tuple[dict[str, float], ...]]:
+    """The mechanism with all numbers stated that conditions set or that are looked for, and what each sets, by path.
+
+    MechanismError where a condition sets what is looked for, or what is no number.
+    """
+    values = (condition.values.items() for condition in conditions)
+    settings = [{mechanism.path_of(name): float(value) for name, value in pairs} for pairs in values]
+    owners = {path: name for name, members in paths.items() for path in members}
+    numbers: dict[str, float | str] = {path: value for row in reversed(settings) for path, value in row.items()}
+    numbers |= {path: start.get(name, 0.0) for path, name in owners.items()}
+    missing = {path: item for path, item in numbers.items() if path not in mechanism.parameter_set.entries}
+    mechanism = mechanism.with_values(missing) if missing else mechanism
+    every = mechanism.parameters()
+    for condition, row in zip(conditions, settings, strict=True):
+        for path in row:
+            what = f"the condition {condition.name} sets {path}"
+            if path in owners:
+                raise MechanismError(Finding(what, f"parameter {owners[path]}", "leave it out of the conditions"))
+            if path not in every:
+                what += ", but it is no number: it changes with the motion"
+                raise MechanismError(Finding(what, path, "set a dimension in it"))
+    return mechanism, tuple(settings)
+
+
+def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
+    """What each channel measures; MechanismError for what has no course."""
+    measures: dict[str, Measure] = {}
+    for block in blocks:
+        channel, text = block.channel, block.signal.measures
+        measure = measure_of(mechanism, run, channel, text)
+        refuse_unit(run, measure, channel, block.signal)
+        if measures.setdefault(channel, measure).name != measure.name:
+            what = f"measures {measures[channel].name} in one condition and {measure.name} in another"
+            raise MechanismError(Finding(what, f"channel {channel}", "use separate channels"))
+    return measures
+
+
+def _acted_on(model: Model) -> dict[str, Measure]:
+    """The channels that an unknown acts on, as far as the start shows; all if there are none."""
+    courses = model.courses(np.array([unknown.start for unknown in model.unknowns]))
+    sizes, moved = np.array([unknown.size or 1.0 for unknown in model.unknowns])[:, None], set[str]()
+    for name, course in (pair for row in courses.by_condition for pair in row.items()):
+        most = float(np.nanmax(np.abs(course.value), initial=0.0)) or 1.0
+        if np.nanmax(np.abs(np.nan_to_num(course.slope)) * sizes, initial=0.0) > NOTHING * most:
+            moved.add(name)
+    return {name: measure for name, measure in model.measures.items() if not moved or name in moved}
+
+
+def _runnable(fit: Fit) -> Array:
+    """The start, with less friction where that locks. MechanismError if no position can be used."""
+    rubs = [p for p, unknown in enumerate(fit.model.unknowns) if any(".friction." in path for path in unknown.paths)]
+    starts, lost = [fit.start], list[int]()
+    for k in range(HALVINGS + 1):
+        lost.append(sum(int(np.sum(codes >= Status.NOT_CONVERGED)) for codes in fit.courses(starts[-1]).status))
+        if not (lost[-1] and rubs):
+            break
+        starts.append(fit.start.copy())
+        starts[-1][rubs] = np.maximum(fit.start[rubs] * 0.5 ** (k + 1), fit.bounds[0][rubs])
+    best = starts[int(np.argmin(lost))]
+    masks = replace(fit, variances=fit.first_scatter()).allowed(best)
+    if not any(np.any(masks[k]) for k in fit.fitted):
+        codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
+        what = "no position can be used: no channel has a value there, friction reverses beside it, or the model has "
+        what += f"no sound answer (most often {list(Status)[int(np.bincount(codes).argmax())].text})"
+        remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
+        raise MechanismError(Finding(what, "data", remedy))
+    return best
+
+
+# ---- the result -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Identified:
+    """An identification, with the figures of its unknowns and, behind them, of the errors of its sensors.
+
+    encoder: path of an unknown by which the encoder of the data is off, no number of the mechanism; empty without.
+    """
+
+    mechanism: Mechanism
+    measurement: Measurement
+    fit: Fit
+    solution: Solution
+    spread: Covariances
+    encoder: str
+
+    @property
+    def x(self) -> Array:
+        """Where the search ended."""
+        return self.solution.x
+
+    @cached_property
+    def groups(self) -> list[tuple[int, ...]]:
+        """Unknowns that the data do not separate, by their places."""
+        return inseparable(self.fit, self.x, self.spread)
+
+    @cached_property
+    def lost(self) -> NDArray[np.bool_]:
+        """What the data do not tell."""
+        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group])
+
+    @cached_property
+    def half(self) -> Array:
+        """Half of a two-sided 95 % interval, whether the data tell the unknown or not."""
+        return np.asarray(quantile(self.spread.freedom) * self.spread.deviation)
+
+    @cached_property
+    def vague(self) -> NDArray[np.bool_]:
+        """Unknowns whose 95 % interval is wider than twice themselves, or than their limits are apart."""
+        low, high = self.fit.bounds
+        return np.asarray((self.half > np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)) & ~self.lost)
+
+    @cached_property
+    def refuting(self) -> dict[int, float]:
+        """What errors of sensors come to with nothing stated of them, by place, where that is far off: of those at
+        their limit, and of those without which there is hardly a misfit."""
+        test, excess = self.spread.test, dict[int, float]()
+        fit = replace(self.fit, inflation=1.0) if test.misfit else self.fit
+        for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
+            at_limit = abs(size) > NEAR_LIMIT * error.most
+            if error.stated and (at_limit or test.misfit):
+                free = replace(fit, sensors=[*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]])
+                x = solved(free, self.x).x
+                explained = at_limit or lack_of_fit(free, x).reduced - 1 < UNEXPLAINED * (test.reduced - 1)
+                if explained and abs(x[fit.count + s]) >= FAR:
+                    excess[s] = float(x[fit.count + s])
+        return excess
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
+        return self.spread.test.gross or bool(self.refuting)
+
+    def intervals(self) -> dict[str, NDArray[Any]]:
+        """Limit that an estimate is on, −1, 0 or 1, the estimate, and its 95 % interval within the limits.
+
+        On a limit the interval is one-sided, from where a step without limits ends if that is inside.
+        """
+        (low, high), x, u = self.fit.bounds, self.x, np.where(self.lost, np.nan, self.spread.deviation)
+        step = -self.spread.inverse @ (self.fit.jacobian(x).T @ self.fit.residuals(x))
+        near = AT_LIMIT * np.nan_to_num(u) + 1e-9 * np.abs(x)
+        upper, lower = (~self.lost & (gap <= near) for gap in (high - x, x - low))
+        limit = np.where(upper & (step >= 0), 1, np.where(lower & (step <= 0), -1, 0))
+        estimate = np.where(self.lost, np.nan, np.where(limit < 0, low, np.where(limit > 0, high, x)))
+        half, one_sided = quantile(self.spread.freedom) * u, quantile(self.spread.freedom, one_sided=True) * u
+        least = np.where(limit > 0, np.minimum(x + step, high) - one_sided, estimate - half)
+        most = np.where(limit < 0, np.maximum(x + step, low) + one_sided, estimate + half)
+        least, most = np.where(limit < 0, low, least), np.where(limit > 0, high, most)
+        figures = {"limit": limit.astype(np.int8), "estimate": estimate, "standard_uncertainty": u}
+        return figures | {"lower": np.maximum(least, low), "upper": np.minimum(most, high)}
+
+    @cached_property
+    def by_block(self) -> dict[str, NDArray[Any]]:
+        """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
+        fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
+        longest = max(len(condition.phase) for condition in conditions)
+        sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
+        variables = {name: variable for name, variable in VARIABLES.items() if variable.dims}
+        arrays = {name: var.blank(sizes) for name, var in variables.items() if set(var.dims) <= set(sizes)}
+        for k, condition in enumerate(conditions):
+            arrays["phase"][k, : len(condition.phase)] = condition.phase
+        allowed = fit.allowed(self.x)
+        for k, block in enumerate(fit.blocks):
+            at, signal, mask = (channels.index(block.channel), block.condition), block.signal, fit.masks[k]
+            mask = allowed[k] if block.held else mask
+            before, after = (np.where(mask, fit.gap(x, k), np.nan) for x in (fit.start, self.x))
+            # of the positions that are used: beside jumps turns scatter more
+            variance, rows = block.pooled(mask) / np.maximum(signal.count, 1), dict[str, Array]()
+            figures: dict[str, float]
+            if block.held:
+                columns = np.where(mask, np.nan_to_num(fit.reading(self.x, k)[1]), 0.0)
+                predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
+                expected = np.where(mask, np.sqrt(variance + predicted), np.nan)
+                figures = {"held_out_turns": len(signal.turns), "held_out_before": rms(before),
+                           "held_out_after": rms(after), "held_out_expected": rms(expected)}  # fmt: skip
+            else:
+                expected = np.where(mask & block.repeats, np.sqrt(variance + block.unresolved**2), np.nan)
+                rows = {"measured": signal.mean, "residual_before": before, "residual_after": after,
+                        "residual_uncertainty": expected}  # fmt: skip
+                figures = {"turns": len(signal.turns), "rms_before": rms(before), "rms_after": rms(after),
+                           "rms_expected": rms(expected), "used": int(np.count_nonzero(mask)),
+                           "left_out": int(np.count_nonzero(np.isfinite(signal.mean) & ~mask))}  # fmt: skip
+            for name, row in rows.items():
+                arrays[name][at][: len(row)] = row
+            for name, figure in figures.items():
+                arrays[name][at] = figure
+        return arrays
+
+    @property
+    def hold_out_ratio(self) -> float:
+        """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
+        return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])
+
+    @cached_property
+    def cycles(self) -> list[DriveCycle]:
+        """The cycle in every condition, with the estimates."""
+        values = np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
+        return [self.fit.model.cycle(k, values) for k in range(len(self.measurement.conditions))]
+
+    def dataset(self) -> xr.Dataset:
+        """Estimates with their uncertainty, residuals and findings."""
+        fit, measurement, mechanism, spread, n = self.fit, self.measurement, self.mechanism, self.spread, self.fit.count
+        model, conditions, intervals = fit.model, measurement.conditions, self.intervals()
+        names, system = [unknown.name for unknown in model.unknowns], model.run.system
+        u, variances = intervals["standard_uncertainty"], np.array([*map(np.diagonal, spread.parts.values())])
+        rows = fit.jacobian(self.x)[:, :n]
+        singular = np.linalg.svd(rows / (np.linalg.norm(rows, axis=0) + (rows == 0).all(axis=0)), compute_uv=False)
+        sizes = [{abs(error.angle)} if error.angle else set(error.sizes[error.sizes != 0]) for error in fit.sensors]
+        arrays = {
+            **self.by_block,
+            **{name: figures[:n] for name, figures in intervals.items()},
+            "start": fit.start[:n],
+            "degrees_of_freedom": spread.freedom[:n],
+            "told": (~self.lost & ~self.vague)[:n].astype(np.int8),
+            "correlation": np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0),
+            "share": np.where(self.lost[:n, None], np.nan, (variances / np.sum(variances, axis=0))[:, :n].T),
+            "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
+            "sensor_error": np.where(self.lost, np.nan, self.x)[n:],
+            "sensor_uncertainty": u[n:],
+            "sensor_size": np.array([size.pop() if len(size) == 1 else np.nan for size in sizes]),
+            "reduced_chi_squared": np.asarray(spread.test.reduced),
+            "chi_squared_freedom": np.asarray(spread.test.freedom),
+            "chi_squared_chance": np.asarray(spread.test.chance),
+            "turn_correlation": np.asarray(spread.follows),
+            "hold_out_ratio": np.asarray(self.hold_out_ratio),
+        }
+        labels = {
+            "parameter": names, "parameter_2": names, "source": list(spread.parts),
+            "sensor": [error.name for error in fit.sensors], "channel": list(model.measures),
+            "condition": [condition.name for condition in conditions],
+        }  # fmt: skip
+        ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in self.cycles]
+        attributes = {
+            "name": mechanism.name,
+            "identified": measurement.name,
+            **origin(mechanism, system.plan.formula),
+            "confidence": CONFIDENCE,
+            "encoder": self.encoder,
+            "parameter_paths": [unknown.paths for unknown in model.unknowns],
+            "parameter_units": [unknown.unit for unknown in model.unknowns],
+            "channel_units": [measure.unit(system) for measure in model.measures.values()],
+            "channel_measures": [measure.name for measure in model.measures.values()],
+            "drive": next(iter(mechanism.drivers), ""),
+            # angles of the first driver where the cycle begins and ends, rad; None if they name no position
+            "drive_range": [list(pair) if np.isfinite(pair).all() else None for pair in ends],
+            "files": [list(condition.files) for condition in conditions],
+            "data_files": hashed_files(conditions),
+            "data_findings": data_findings(measurement),
+            "done": list(measurement.done),
+            "inputs": inputs(mechanism),
+            "evaluations": fit.courses_at.count,
+            "converged": int(self.solution.converged),
+            "references": "\n".join([*SOURCES, *references(mechanism)]),
+            "findings": finding_rows(self.findings()),
+        }
+        variables = described({name: arrays[name] for name in VARIABLES}, VARIABLES)
+        return dataset_of("identification", variables, labels, attributes)
+
+    def findings(self) -> list[Finding]:
+        """Errors and warnings first."""
+        fit, conditions = self.fit, self.measurement.conditions
+        driver, fitted = next(iter(self.mechanism.drivers), ""), {fit.blocks[k].condition for k in fit.fitted}
+        rows = [*other_speed(driver, [(conditions[k], self.cycles[k].speed) for k in sorted(fitted)])]
+        rows += [*_of_fit(self), *_of_sensors(self), *_of_parameters(self)]
+        return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))
+
+
+# ---- findings -------------------------------------------------------------------------------------------------
+
+
+def _joined(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _of_fit(identified: _Identified) -> Iterator[Finding]:
+    """Whether the search converged, the model fits and predicts, and turns and conditions repeat."""
+    fit, spread, solution, ratio = identified.fit, identified.spread, identified.solution, identified.hold_out_ratio
+    test = spread.test
+    if not (solution.converged and solution.settled):
+        what, remedy = "the search did not converge", "give start values closer to the solution, or fewer parameters"
+        severity = Severity.WARNING if solution.converged else Severity.ERROR
+        yield Finding.weighed(severity, "search.not_ended", "search", what, remedy, evaluations=solution.evaluations)
+    if test.misfit:
+        worth = "the estimates mean nothing" if identified.refuted else "the intervals are widened accordingly"
+        reduced = f"{float(f'{test.reduced:.3g}'):,.10g}"  # without a power of ten
+        what = f"the model does not fit: reduced χ² {reduced} (1 is expected from the scatter between turns), p-value "
+        what += f"{max(test.chance, 1e-4):.2g}{' or less' * (test.chance < 1e-4)}; {worth}"
+        remedy = "`trunnion compare` shows what zero, gain, angle or friction would explain it; or identify more "
+        severity = Severity.ERROR if identified.refuted else Severity.WARNING
+        figures = {"reduced": test.reduced, "chance": test.chance}
+        yield Finding.weighed(severity, "fit.misfit", "fit", what, f"{remedy}parameters", **figures)
+    if ratio > POOR:
+        what = f"the held-out data differ from the prediction by {ratio:.1f} times its standard uncertainty"
+        remedy = "the model lacks an effect that differs there"
+        yield Finding.warning("held_out.missed", "hold_out", what, remedy, times=ratio)
+    for p, unknown in enumerate(fit.model.unknowns):
+        times = float(np.sqrt(spread.apart[p]))
+        if times > 1 and not identified.lost[p]:
+            what = f"the conditions disagree: estimates from single ones vary {times:.2g} times as much as the "
+            what += "scatter between turns explains; the interval is widened accordingly"
+            remedy = "look for differences between conditions: settings, speed, temperature, the zero of each file"
+            severity = Severity.WARNING if times > MUCH else Severity.NOTE
+            where = f"parameter {unknown.name}"
+            yield Finding.weighed(severity, "fit.conditions_disagree", where, what, remedy, times=times)
+    fitted = [fit.blocks[k] for k in fit.fitted]
+    if not any(block.repeats for block in fitted):
+        what = "no turn is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
+        what += "intervals are too narrow if the data are filtered"
+        yield Finding.warning("fit.not_repeated", "data", what, "record several turns")
+    if spread.follows > 2 / np.sqrt(max(sum(len(block.spread) - 1 for block in fitted), 1)):
+        what = f"successive turns are correlated ({spread.follows:.2f}): the intervals are widened accordingly"
+        remedy = "look for a drift; warm the rig up"
+        yield Finding.warning("fit.turns_alike", "data", what, remedy, correlation=spread.follows)
+
+
+def _of_sensors(identified: _Identified) -> Iterator[Finding]:
+    """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit."""
+    fit = identified.fit
+    stated = {fit.blocks[k].channel for k in fit.fitted for accuracy in [fit.blocks[k].signal.accuracy]
+              if shared_zero(accuracy) or accuracy.gain}  # fmt: skip
+    channels = dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)
+    if bare := [name for name in channels if name not in stated and not fit.model.measures[name].of_motion]:
+        what = f"no accuracy is stated for {_joined(bare)}: zero and gain count as exact, and the intervals are too "
+        remedy = "state accuracy: {zero: …, gain: …} in the mapping"
+        yield Finding.warning("sensor.no_accuracy", "sensors", f"{what}narrow", remedy)
+    for s, sensor in enumerate(fit.sensors) if not identified.spread.test.gross else ():
+        excess, times = s in identified.refuting, abs(identified.refuting.get(s, float(identified.x[fit.count + s])))
+        if sensor.stated and times > OFF:
+            what = f"differs from its stated value by {times:.1f} standard uncertainties"
+            what += ", which no stated error does: the estimates mean nothing" * excess
+            remedy = "check the sensor, its unit, its stated accuracy, and lengths and loads of the model"
+            where, severity = "angle.zero" if sensor.angle else sensor.name, (Severity.WARNING, Severity.ERROR)[excess]
+            yield Finding.weighed(severity, "sensor.off", where, what, remedy, times=times, beyond=excess)
+
+
+def _of_parameters(identified: _Identified) -> Iterator[Finding]:
+    """Unknowns without an effect, that are not told apart, or that the data hardly determine."""
+    fit = identified.fit
+    channels = _joined(list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)))
+    every = [*(unknown.name for unknown in fit.model.unknowns), *(f"the {error.name}" for error in fit.sensors)]
+    for group in identified.groups:
+        names = [every[i] for i in group]
+        what = f"{names[0]} is not identifiable: it has no effect on {channels}"
+        if len(names) > 1:
+            what = f"{_joined(names)} are not separately identifiable: they have the same effect on {channels}"
+        remedy = "fix one or more, or measure a quantity that tells them"
+        yield Finding.warning("parameter.not_told_apart", f"parameter {names[0]}", what, remedy, names=names)
+    for p, unknown in enumerate(fit.model.unknowns) if not identified.refuted else ():
+        if identified.vague[p]:  # of a model that does not fit, that is why
+            about = with_uncertainty(float(identified.x[p]), float(identified.half[p]), unknown.unit)
+            what = f"{unknown.name} is not identifiable: its 95 % interval, {about}, is wider than the value itself"
+            remedy = "fix it, or measure a quantity that depends on it more"
+            yield Finding.warning("parameter.vague", f"parameter {unknown.name}", what, remedy)
+
+
+# ---- estimates in the model -----------------------------------------------------------------------------------
+
+
+def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
+    """Put the estimates of a result into the mechanism, rounded to two digits of their standard uncertainty.
+
+    Parameters
+    ----------
+    mechanism : the model that was identified.
+    result : of `identify`.
+
+    Returns
+    -------
+    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is, and
+    so does the start of a driver: by that the encoder is off, and the zero of the angle in the mapping.
+    """
+    values: dict[str, float | str] = {}
+    units = attribute(result, "parameter_units")
+    for p, paths in enumerate(attribute(result, "parameter_paths")):
+        estimate, u = (float(result[name].values[p]) for name in ("estimate", "standard_uncertainty"))
+        if not result["told"].values[p] or result.attrs["encoder"] in paths:
+            continue
+        for path in paths:
+            entry = mechanism.parameter_set.entries.get(path)
+            unit, factor = written_unit(entry.quantity.source if entry else "", units[p])
+            places, value = decimals(u / factor) if u > 0 else 6, estimate / factor
+            number = f"{round(value, places):.{max(places, 0)}f}" if places < 12 else f"{value:.6g}"
+            values[path] = f"{number} {unit}" if unit else float(number)
+    return mechanism.with_values(values)

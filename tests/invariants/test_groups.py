@@ -14,8 +14,8 @@ from mechanisms import Array, dyad
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.plane import Frame, Twist, Wrench, acceleration_at, compose, velocity_at
 from trunnion.groups import GROUPS
+from trunnion.groups.dyads import meet
 from trunnion.groups.general import General
-from trunnion.groups.rrr import meet
 from trunnion.groups.tree import OUTER, GroupJoint
 
 

@@ -10,11 +10,7 @@ closed forms in the plane by the letters of their joints; everything else is a `
 from __future__ import annotations
 
 from trunnion.groups.dyad import Dyad
-from trunnion.groups.prp import PRP
-from trunnion.groups.rpp import RPP
-from trunnion.groups.rpr import RPR
-from trunnion.groups.rrp import RRP
-from trunnion.groups.rrr import RRR
+from trunnion.groups.dyads import PRP, RPP, RPR, RRP, RRR
 
 __all__ = ["GROUPS"]
 

@@ -18,7 +18,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import Frame, Twist, Wrench, about, moment_at, place_of, velocity_at
 from trunnion.groups.gear import NUMBERS, GearPair, actions, slide_of, turn_from
-from trunnion.groups.redundant import Support
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
 from trunnion.joints.pair_motion import MOTIONS, PairMotion
 
@@ -65,7 +64,8 @@ class General(Tree):
         for k in self.chords:
             first, second = placed[k][:2]
             aim = self.motion(k).place(first, q[k]) if k in self.driven else first
-            gap = Twist(second.x - aim.x, second.y - aim.y, turn_from(aim, second, 0.0) if self._aligned(k) else 0.0)
+            aligned = k in self.driven or not self.joints[k].pair.turns  # it asks for a direction, too
+            gap = Twist(second.x - aim.x, second.y - aim.y, turn_from(aim, second, 0.0) if aligned else 0.0)
             rows += self._components(k, first, gap, size)
         for i, gear in enumerate(self.gears):  # φ₂ − i φ₁ − φ₀, of a turn within half a turn
             slot = len(self.driven) + NUMBERS * i
@@ -79,10 +79,6 @@ class General(Tree):
             aim, second = ratio * start + phase, placed[gear.second][:2]
             rows.append((slide_of(second) - aim) / size if gear.slide == 1 else turn_from(*second, aim))
         return rows
-
-    def _aligned(self, chord: int) -> bool:
-        """Whether a chord asks for a direction."""
-        return chord in self.driven or not self.joints[chord].pair.turns
 
     def _components(self, chord: int, first: Frame, gap: Twist, size: Number) -> list[Number]:
         """The rows of a chord of how its point on the second link moves, or is off, and how that link turns."""
@@ -132,10 +128,6 @@ class General(Tree):
         return [first.c * x + first.s * y]
 
     # ---- gear pairs -------------------------------------------------------------------------------------------
-
-    def _posed(self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number] = ()) -> Pose:
-        pose = super()._posed(elements, q, size, drive)
-        return pose._replace(ratios=tuple(drive[len(self.driven) :: NUMBERS]))
 
     def _newton(
         self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number], rounds: int
@@ -201,12 +193,6 @@ class General(Tree):
         """Of the joints, then what each gear pair puts into its second joint."""
         efforts = self._efforts(pose, multipliers)
         return super().link_by_link(pose, loads, multipliers) + [Wrench(0.0, 0.0, effort) for effort in efforts]
-
-    def reactions(self, pose: Pose, loads: Sequence[Wrench], supports: Sequence[Support] = ()) -> list[Wrench]:
-        """See `General`."""
-        wrenches = super().reactions(pose, loads, supports)
-        count = len(self.joints)
-        return [self.at_joint(pose, k, wrench) for k, wrench in enumerate(wrenches[:count])] + wrenches[count:]
 
     def at_joint(self, pose: Pose, k: int, wrench: Wrench) -> Wrench:
         """About the joint's point on its second link, where a pin that is not driven carries no moment."""

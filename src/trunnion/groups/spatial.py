@@ -7,7 +7,7 @@ row: it does not spin about the line of its joints.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -47,21 +47,19 @@ class SpatialGroup(Tree):
         """Three turns and three lengths."""
         return 6
 
-    def _loops(self, placed: Sequence[Element], q: Coordinates) -> Iterator[tuple[Vector3, Vector3]]:
-        """Turn and way from where each loop's last joint puts its second element to where that is."""
+    def gaps(
+        self, placed: Sequence[Element], q: Coordinates, size: Number, drive: Sequence[Number] = ()
+    ) -> list[Number]:
+        """Turn and way from where each loop's last joint puts its second element to where that is.
+
+        A spin is never open.
+        """
+        rows: list[Number] = []
         for k in self.chords:
             first, second, lead = placed[k]
             aim = self.motion(k).place(first, q[k], lead)
             turn = plus(plus(cross(aim.x, second.x), cross(aim.y, second.y)), cross(aim.z, second.z))
-            yield scaled(0.5, turn), vector_minus(second.place, aim.place)
-
-    def gaps(
-        self, placed: Sequence[Element], q: Coordinates, size: Number, drive: Sequence[Number] = ()
-    ) -> list[Number]:
-        """Of the loops; a spin is never open."""
-        rows: list[Number] = []
-        for turn, gap in self._loops(placed, q):
-            rows += [*turn, *(length / size for length in gap)]
+            rows += [*scaled(0.5, turn), *(length / size for length in vector_minus(second.place, aim.place))]
         return rows + [0.0] * len(self.spinning)
 
     def opening(self, placed: Sequence[Element], q: Coordinates, size: Number) -> Number:

@@ -29,6 +29,7 @@ from trunnion.algebra.dual import depth, primal
 from trunnion.algebra.namespace import Number, apart, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.groups import redundant
+from trunnion.groups.gear import NUMBERS
 from trunnion.groups.redundant import Support
 from trunnion.joints.pair_motion import PairMotion
 from trunnion.joints.pairs import PAIRS, Pair
@@ -311,54 +312,64 @@ class Tree(ABC):
             row = self._in_row(q)
             q = self.coordinates([row[i] for i in self.kept], drive)
             for _ in range(depth(numbers)):
-                q = self._step(elements, q, size, drive)
+                q = self.advanced(q, self._steps(elements, q, size, drive), size)
             return self._posed(elements, q, size, drive)
 
     def _posed(self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number] = ()) -> Pose:
-        """The pose at its coordinates."""
+        """The pose at its coordinates, with J⁻¹, its condition, and the sign of det J."""
         frames, placed, screws = self.place(elements, q)
-        jacobian = self.jacobian(placed, screws, size, drive)
-        gap = self.opening(placed, q, size)
-        if self.chords and not self.free:  # held fast: either it closes as it is or not at all
-            hole = np.where(gap <= CLOSED * size, 0.0, np.nan)
-            frames = each(frames, lambda n: n + hole)
-        inverse, condition, orientation = self._inverted(jacobian, gap, size)
+        jacobian, gap = self.jacobian(placed, screws, size, drive), self.opening(placed, q, size)
+        inverse: list[list[Number]] = []
+        condition: Number = 1.0
+        orientation: Number = 1.0  # a closed form stays on its branch by itself
+        if not jacobian or not self.free:  # held fast: either it closes as it is or not at all
+            orientation = np.where(gap <= CLOSED * size, 1.0, np.nan)
+            frames = each(frames, lambda n: n * orientation) if self.chords else frames
+        elif self.redundant:
+            inverse, condition = redundant.pseudo_inverse(jacobian), redundant.condition(jacobian)
+        else:
+            inverse = linalg.inverse(jacobian)
+            condition = frobenius(jacobian, inverse)
+            if not self.BRANCHES:
+                orientation = np.sign(primal(linalg.determinant(jacobian)))
         row = tuple(self._in_row(q))
-        return Pose(frames, placed, screws, row, jacobian, inverse, size, gap, condition, orientation)
-
-    def _inverted(
-        self, jacobian: list[list[Number]], gap: Number, size: Number
-    ) -> tuple[list[list[Number]], Number, Number]:
-        """J⁻¹, its condition, and the sign of det J."""
-        if not jacobian or not self.free:
-            return [], 1.0, np.where(gap <= CLOSED * size, 1.0, np.nan)  # no coordinate could close what is open
-        if self.redundant:
-            return redundant.pseudo_inverse(jacobian), redundant.condition(jacobian), 1.0
-        inverse = linalg.inverse(jacobian)
-        # a closed form stays on its branch by itself
-        orientation = 1.0 if self.BRANCHES else np.sign(primal(linalg.determinant(jacobian)))
-        return inverse, frobenius(jacobian, inverse), orientation
+        ratios = tuple(drive[len(self.driven) :: NUMBERS])
+        return Pose(frames, placed, screws, row, jacobian, inverse, size, gap, condition, orientation, ratios)
 
     def _newton(
         self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number], rounds: int
     ) -> Coordinates:
-        """Newton on real numbers; lanes that do not converge are NaN. rounds: for those that are late."""
+        """Newton on real numbers; lanes that do not converge are NaN. rounds: for those that are late.
+
+        Those go on alone: they are few or beyond help. Least squares end where the loops are open least, not always
+        closed.
+        """
         q = [[namespace(v).asarray(v, float) for v in joint] for joint in q]
         if not self.free or not self.asks:
             return q
         q, moved_by = self._iterate(elements, q, size, drive, QUICK)
         late = ~(moved_by <= NEARLY)
         if rounds and apart(late):
-            q, moved_by = self._finish_late(elements, q, size, drive, late, rounds)
-        q = self._step(elements, q, size, drive)  # quadratic: from NEARLY to rounding
-        closed = self.settled(elements, q, size, moved_by)
-        return [[np.where(closed, value, np.nan) for value in joint] for joint in q]
+            shape = late.shape
 
-    def settled(self, elements: Sequence[Any], q: Coordinates, size: Number, moved_by: Number) -> Number:
-        """Where Newton's method has arrived: least squares end where the loops are open least, not always closed."""
-        if not self.redundant:
-            return moved_by <= NEARLY
-        return (moved_by <= NEARLY) & (self.opening(self.place(elements, q)[1], q, size) <= CLOSED * size)
+            def part(number: Number) -> Number:
+                # a number that is the same in all lanes stays one: of its zeros and ones no products are made
+                return np.broadcast_to(number, shape)[late] if np.ndim(number) else number
+
+            begin = [[np.broadcast_to(value, shape)[late] for value in joint] for joint in q]
+            few = [each(pair, part) for pair in elements]
+            better, last = self._iterate(few, begin, part(size), [part(v) for v in drive], rounds)
+            moved_by = np.zeros(shape)
+            moved_by[late] = last
+            q = [
+                [replaced(value, late, new) for value, new in zip(joint, after, strict=True)]
+                for joint, after in zip(q, better, strict=True)
+            ]
+        q = self.advanced(q, self._steps(elements, q, size, drive), size)  # quadratic: from NEARLY to rounding
+        closed = moved_by <= NEARLY
+        if self.redundant:
+            closed = closed & (self.opening(self.place(elements, q)[1], q, size) <= CLOSED * size)
+        return [[np.where(closed, value, np.nan) for value in joint] for joint in q]
 
     def _iterate(
         self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number], rounds: int
@@ -376,67 +387,33 @@ class Tree(ABC):
             last = functools.reduce(np.maximum, moves)
             shrink = 1 / np.maximum(last, 1.0)  # as a whole, so that the direction stays
             after = self.advanced(now, [[value * shrink for value in values] for values in steps], size)
-            further, arrived_at = [*self._in_row(after), last], arrived(state)
-            return (
-                further
-                if not np.any(arrived_at)
-                else [np.where(arrived_at, *pair) for pair in zip(state, further, strict=True)]
-            )
+            further, there = [*self._in_row(after), last], arrived(state)
+            if not np.any(there):
+                return further
+            return [np.where(there, *pair) for pair in zip(state, further, strict=True)]
 
         def arrived(state: list[Number]) -> Number:
             return np.logical_not(state[-1] > NEARLY)
 
-        start = [*self._in_row(q), np.inf]
-        *row, last = looped(step, start, rounds, arrived)
+        *row, last = looped(step, [*self._in_row(q), np.inf], rounds, arrived)
         return self._by_joint(row), np.broadcast_to(last, np.broadcast_shapes(*(np.shape(v) for v in (last, *row))))
-
-    def _finish_late(
-        self,
-        elements: Sequence[Any],
-        q: Coordinates,
-        size: Number,
-        drive: Sequence[Number],
-        late: Number,
-        rounds: int,
-    ) -> tuple[Coordinates, Number]:
-        """Go on with the lanes that are still open, and with those alone: they are few or beyond help."""
-        shape = late.shape
-
-        def part(number: Number) -> Number:
-            # a number that is the same in all lanes stays one: of its zeros and ones no products are made
-            return np.broadcast_to(number, shape)[late] if np.ndim(number) else number
-
-        few = [each(pair, part) for pair in elements]
-        start = [[np.broadcast_to(value, shape)[late] for value in joint] for joint in q]
-        better, last = self._iterate(few, start, part(size), [part(v) for v in drive], rounds)
-        moved_by = np.zeros(shape)
-        moved_by[late] = last
-        merged = [
-            [replaced(value, late, new) for value, new in zip(joint, after, strict=True)]
-            for joint, after in zip(q, better, strict=True)
-        ]
-        return merged, moved_by
-
-    def _step(self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number]) -> Coordinates:
-        """One whole Newton step."""
-        return self.advanced(q, self._steps(elements, q, size, drive), size)
 
     def _steps(self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number]) -> Coordinates:
         """Newton's step in every freedom, slides in units of the size; 0 for the driven."""
         _, placed, screws = self.place(elements, q)
-        moves = self.solved(self.jacobian(placed, screws, size, drive), self.gaps(placed, q, size, drive))
+        jacobian, gaps = self.jacobian(placed, screws, size, drive), self.gaps(placed, q, size, drive)
+        moves = redundant.least_squares(jacobian, gaps) if self.redundant else linalg.solve(jacobian, gaps)[0]
         steps = self.unmoved()
         for (k, i), move in zip(self.free, moves, strict=True):
             steps[k][i] = -move
         return steps
 
-    def solved(self, jacobian: list[list[Number]], gaps: list[Number]) -> Sequence[Number]:
-        """J⁻¹ gap."""
-        return redundant.least_squares(jacobian, gaps) if self.redundant else linalg.solve(jacobian, gaps)[0]
-
-    def unmoved(self) -> Coordinates:
-        """No step in any freedom."""
-        return [[0.0] * len(self.motion(k).steps) for k in range(len(self.joints))]
+    def unmoved(self, driven: Sequence[Number] = ()) -> Coordinates:
+        """A number for every freedom, those of the driven ones and else 0."""
+        numbers: Coordinates = [[0.0] * len(self.motion(k).steps) for k in range(len(self.joints))]
+        for k, value in zip(self.driven, driven, strict=False):
+            numbers[k][0] = value
+        return numbers
 
     def advanced(self, q: Coordinates, steps: Coordinates, size: Number) -> Coordinates:
         """The coordinates after steps in the freedoms, slides in units of the size."""
@@ -482,22 +459,20 @@ class Tree(ABC):
         speeds = self.rates(pose, outer, drive)
         twists = self.twists(pose, outer, speeds)
         carried = [self._carried(pose, k, speeds[k], twists, outer) for k in range(len(self.joints))]
-        driven = self._driven_only(seconds)
-        second_motions = self._accelerations(pose, outer_seconds, driven, carried)
+        driven = self.unmoved(seconds)
+        second_motions = self.twists(pose, outer_seconds, driven, carried)
         rows: list[Number] = []
         for k in self.chords:
             relative = self.algebra.minus(self.across(k, second_motions, outer_seconds), carried[k])
             rows += self._opened(pose, k, relative, driven[k])
-        further, more = (
-            self.further_rates(pose, second_motions, outer_seconds),
-            self.further_carried(pose, twists, outer),
-        )
+        more = self.further_carried(pose, twists, outer)
+        further = self.further_rates(pose, second_motions, outer_seconds)
         rows += [rate + change for rate, change in zip(further, more, strict=True)] if more else further
-        return twists, self._accelerations(pose, outer_seconds, self._closing(pose, driven, rows), carried)
+        return twists, self.twists(pose, outer_seconds, self._closing(pose, driven, rows), carried)
 
     def rates(self, pose: Pose, outer: Sequence[Any], drive: Sequence[Number] = ()) -> Coordinates:
         """Rate of every freedom of every joint, rad/s and m/s."""
-        rates = self._driven_only(drive)
+        rates = self.unmoved(drive)
         if not self.free:
             return rates
         twists = self.twists(pose, outer, rates)
@@ -512,12 +487,6 @@ class Tree(ABC):
             relative = self.algebra.minus(relative, self.algebra.times(rate, screw))
         return self.entries(chord, pose.elements[chord], relative, pose.size)
 
-    def _driven_only(self, drive: Sequence[Number]) -> Coordinates:
-        rates = self.unmoved()
-        for k, value in zip(self.driven, drive, strict=False):
-            rates[k][0] = value
-        return rates
-
     def _closing(self, pose: Pose, rates: Coordinates, rows: Sequence[Number]) -> Coordinates:
         """The rates with those of the free coordinates that close what is open."""
         closing = [list(values) for values in rates]
@@ -526,15 +495,18 @@ class Tree(ABC):
             closing[k][i] = value * pose.size if self.slides(k, i) else value
         return closing
 
-    def twists(self, pose: Pose, outer: Sequence[Any], rates: Sequence[Sequence[Number]]) -> list[Any]:
-        """Twists of the links from the rates of all freedoms."""
+    def twists(
+        self, pose: Pose, outer: Sequence[Any], rates: Sequence[Sequence[Number]], carried: Sequence[Any] = ()
+    ) -> list[Any]:
+        """Twists of the links from the rates of all freedoms; or their derivatives from second derivatives of these,
+        and what carries the screws of each joint along."""
         algebra, twists = self.algebra, dict[int, Any]()
         for step in self.steps:
             k = step.joint
-            twist = (outer[k] or algebra.ZERO) if step.parent == OUTER else twists[step.parent]
-            for screw, rate in zip(pose.screws[k], rates[k], strict=True):
-                twist = algebra.added(twist, algebra.times(rate if step.near == 0 else -rate, screw))
-            twists[step.child] = twist
+            base = (outer[k] or algebra.ZERO) if step.parent == OUTER else twists[step.parent]
+            parts = [algebra.times(rate, screw) for screw, rate in zip(pose.screws[k], rates[k], strict=True)]
+            add = algebra.added if step.near == 0 else algebra.minus
+            twists[step.child] = functools.reduce(add, [*carried[k : k + 1], *parts], base)
         return [twists[link] for link in range(self.links)]
 
     def of(self, k: int, side: int, twists: Sequence[Any], outer: Sequence[Any]) -> Any:
@@ -562,19 +534,6 @@ class Tree(ABC):
                 twist = algebra.added(twist, part)
         return total
 
-    def _accelerations(
-        self, pose: Pose, outer: Sequence[Any], seconds: Sequence[Sequence[Number]], carried: Sequence[Any]
-    ) -> list[Any]:
-        algebra, second_motions = self.algebra, dict[int, Any]()
-        for step in self.steps:
-            k = step.joint
-            base = (outer[k] or algebra.ZERO) if step.parent == OUTER else second_motions[step.parent]
-            part = carried[k]
-            for screw, value in zip(pose.screws[k], seconds[k], strict=True):
-                part = algebra.added(part, algebra.times(value, screw))
-            second_motions[step.child] = algebra.added(base, part) if step.near == 0 else algebra.minus(base, part)
-        return [second_motions[link] for link in range(self.links)]
-
     # ---- reactions --------------------------------------------------------------------------------------------
 
     def reactions(self, pose: Pose, loads: Sequence[Any], supports: Sequence[Support] = ()) -> list[Any]:
@@ -584,7 +543,7 @@ class Tree(ABC):
         drive effort. Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link. supports: of
         the joints, which share what statics leaves open.
         """
-        multipliers = self.multipliers(pose, loads)
+        multipliers, count = self.multipliers(pose, loads), len(self.joints)
         if self.redundant and multipliers:
 
             def energy(under: Sequence[Number], loaded: bool) -> NDArray[np.float64]:
@@ -593,10 +552,11 @@ class Tree(ABC):
                 return redundant.weighed(self.algebra, wrenches, pose.elements, supports, pose.size)
 
             multipliers = redundant.least(pose.jacobian, energy, multipliers)
-        return self.link_by_link(pose, loads, multipliers)
+        wrenches = self.link_by_link(pose, loads, multipliers)
+        return [self.at_joint(pose, k, wrench) for k, wrench in enumerate(wrenches[:count])] + wrenches[count:]
 
     def at_joint(self, pose: Pose, k: int, wrench: Any) -> Any:
-        """A joint's wrench about what its reaction is about: the origin."""
+        """A joint's wrench about what its reaction is about: in space the origin."""
         return wrench
 
     def link_by_link(self, pose: Pose, loads: Sequence[Any], multipliers: Sequence[Number]) -> list[Any]:

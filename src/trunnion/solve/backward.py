@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
@@ -223,10 +223,21 @@ def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backwa
     for joint in system.joints:
         if joint in rubs:
             back.contacts[joint] = list(contacts_of(walk, joint))
-        back.resting[joint] = _resting(back, joint)
+        still = [rub.zero for rub in back.contacts.get(joint, [])]
+        still += [walk.still(joint, turns) for turns in system.resisted.get(joint, ())]
+        back.resting[joint] = functools.reduce(operator.or_, still) if still else False
         cut(walk.time)
     _add_body_loads(back)
-    _add_stated_loads(back, conditions.zero_slip, conditions.rests)
+    senses = {joint: sense_of(conditions.zero_slip, joint) for joint in conditions.zero_slip}
+    for name, action in stated_loads(walk, senses, conditions.rests):
+        back.load_powers[name] = action.power
+        back.act(action, f"loads.{name}")
+    for name, action, effort in losses(walk, senses, conditions.rests):
+        back.drags[name] = effort, -action.power
+        back.act(action)
+    for name, action, spring in springs(walk):
+        back.springs[name] = spring
+        back.act(action, f"springs.{name}")
     for name, action in conditions.acting(walk) if conditions.acting else ():
         back.load_powers[name] = action.power
         back.act(action, name)
@@ -239,13 +250,6 @@ def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backwa
 
 def unloaded(walk: Forward) -> dict[str, Any]:
     return dict.fromkeys(walk.system.mechanism.effective_links, walk.algebra.ZERO_LOAD)
-
-
-def _resting(back: Backward, joint: str) -> Number:
-    """Where a contact of a joint rests, or the turn or slide that a load resists."""
-    zeros = [rub.zero for rub in back.contacts.get(joint, [])]
-    zeros += [back.walk.still(joint, turns) for turns in back.walk.system.resisted.get(joint, ())]
-    return functools.reduce(operator.or_, zeros) if zeros else False
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------
@@ -269,20 +273,6 @@ def _add_body_loads(back: Backward) -> None:
         cut(walk.time)
 
 
-def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], sensed: Container[str]) -> None:
-    """The loads and springs of the model, with the power each gives the mechanism."""
-    senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
-    for name, action in stated_loads(back.walk, senses, sensed):
-        back.load_powers[name] = action.power
-        back.act(action, f"loads.{name}")
-    for name, action, effort in losses(back.walk, senses, sensed):
-        back.drags[name] = effort, -action.power
-        back.act(action)
-    for name, action, state in springs(back.walk):
-        back.springs[name] = state
-        back.act(action, f"springs.{name}")
-
-
 # ---- one module -----------------------------------------------------------------------------------------------
 
 
@@ -295,7 +285,12 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, conditio
         joint = place.joint
         for i, rub in enumerate(() if place.witness or joint in system.screws else back.contacts.get(joint, ())):
             slope, slip, felt = _felt(back, joint, rub, conditions, i)
-            rubbed.append((_contact(walk, module.links, k, joint, rub, slope), felt))
+            first, second = system.joints[joint][1]
+            unit = walk.on_link(second, rub.unit, joint)
+            on = {first: walk.algebra.times(-1.0, unit), second: unit}
+            units_ = [on.get(link, walk.algebra.ZERO_LOAD) for link in module.links]
+            own = tuple(flat(rub.unit)) if rub.felt else None
+            rubbed.append((Contact(k, units_, rub.load, slope, own=own), felt))
             if rub.turning is not None:
                 back.turning[joint] = literal.times(slope, rub.turning), slip
     for i, name in enumerate(module.gears):
@@ -354,46 +349,31 @@ def pass_on(
 
 
 def _felt(back: Backward, joint: str, rub: Rubbing, conditions: Given, i: int) -> tuple[Number, Number, Rubbing]:
-    """Friction force of a contact for each newton of its normal load, the slip that goes with it, and the contact.
+    """Friction force of the i-th contact of a joint for each newton of its normal load, the slip that goes with it, and
+    the contact.
 
-    Power goes by the speed itself where the law is told on which side of rest it is.
-    """
-    slope, slip = _slope(back, joint, rub, conditions, i)
-    return slope, slip, rub if joint in conditions.rests else rub._replace(slip=slip)
-
-
-def _slope(back: Backward, joint: str, rub: Rubbing, conditions: Given, i: int) -> tuple[Number, Number]:
-    """Friction force of the i-th contact of a joint for each newton of its normal load, and the slip that goes with it.
-
-    Where there is no slip it is that which is about to begin.
+    Where there is no slip it is that which is about to begin. Power goes by the speed itself where the law is told on
+    which side of rest it is.
     """
     law = law_of(back.walk.system, joint)
     parameters = law_parameters(law, back.walk.values, joint)
     if joint in conditions.deflections:
         parameters["deflection"] = conditions.deflections[joint]
     sense, slip, zero, sliding = sense_of(conditions.zero_slip, joint, i), rub.slip, rub.zero, conditions.sliding
-    if joint in conditions.rests:  # it is known whether it rests or slides in a sense
+    stated = joint in conditions.rests  # whether it rests or slides in a sense
+    if stated:
         zero, sliding = np.bool_(conditions.rests[joint]), False
         if not zero:
             slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
-    if not np.any(zero):
-        return law.function(1.0, slip, **directed(parameters, slip)), slip
-    slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
+    resting = np.any(zero)
+    if resting:
+        slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
     slope = law.function(1.0, slip, **directed(parameters, slip))
-    if law.at_rest is not None and not sliding:
+    if resting and law.at_rest is not None and not sliding:
         slope = namespace(slope).where(zero, law.at_rest(1.0, slip, **parameters), slope)
-    if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
+    if resting and law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
         slope = np.where(zero, np.abs(sense), 1.0) * slope
-    return slope, slip
-
-
-def _contact(walk: Forward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, slope: Number) -> Contact:
-    """One contact of a joint, the k-th of its module, as `friction` sees it."""
-    first, second = walk.system.joints[joint][1]
-    unit = walk.on_link(second, rub.unit, joint)
-    on = {first: walk.algebra.times(-1.0, unit), second: unit}
-    units = [on.get(link, walk.algebra.ZERO_LOAD) for link in links]
-    return Contact(k, units, rub.load, slope, own=tuple(flat(rub.unit)) if rub.felt else None)
+    return slope, slip, rub if stated else rub._replace(slip=slip)
 
 
 def _record(

@@ -22,11 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.roots import root
 from trunnion.joints.friction import FrictionLaw
-from trunnion.solve.forward import Assembly, Forward, forward
+from trunnion.solve.forward import Assembly, forward
 from trunnion.solve.system import Cycle, System, Values, law_of, rubbing
 
 __all__ = ["History", "histories"]
@@ -106,31 +106,24 @@ def histories(
     joints = [name for name in rubbing(system) if law_of(system, name).relaxation is not None]
     if not joints or cycle.duration <= 0:
         return {}
-    count = INTERVALS * max(1, int(np.ceil(cycle.turns)))
-    duration = cycle.duration * _stretch(system, values)
-    walk = forward(system, values, assembly, np.linspace(0.0, 1.0, count + 1) * duration)
-    return {name: _history(walk, name, duration / count, cycle.periodic, reverse) for name in joints}
-
-
-def _stretch(system: System, values: Values) -> Number:
-    """How much longer the cycle takes than the nominal one, as its slowest driver does."""
+    # the cycle takes longer than the nominal one as its slowest driver does
     nominal = system.mechanism.parameters()
-    spans = {name: float(np.ravel(primal(system.span(nominal, name).duration))[0]) for name in system.mechanism.drivers}
+    spans = {name: single(system.span(nominal, name).duration) for name in system.mechanism.drivers}
     slowest = max(spans, key=spans.__getitem__)
-    return system.span(values, slowest).duration / spans[slowest]
-
-
-def _history(walk: Forward, joint: str, length: Number, periodic: bool, reverse: bool) -> History:
-    per_way = functools.partial(_per_way, law_of(walk.system, joint), walk.values, f"joints.{joint}.friction")
-    speed, rate = walk.slip_motion(joint)
-    count = np.shape(primal(walk.time))[-1]
-    speed, rate = speed + np.zeros(count), rate + np.zeros(count)  # with all their lanes along the last axis
-    if reverse:
-        speed, rate = -_picked(speed, np.arange(count)[::-1]), _picked(rate, np.arange(count)[::-1])
-    slip = _Slip.between(speed, rate, np.arange(count - 1), length)
-    keep, gain = _mapped(per_way, slip, np.ones(count - 1))
-    deflections = _chained(keep, gain, periodic)
-    return History(per_way, speed, rate, length, deflections, periodic)
+    duration = cycle.duration * (system.span(values, slowest).duration / spans[slowest])
+    count = INTERVALS * max(1, int(np.ceil(cycle.turns)))
+    length, ends = duration / count, np.arange(count + 1)
+    walk = forward(system, values, assembly, np.linspace(0.0, 1.0, count + 1) * duration)
+    histories_of = {}
+    for joint in joints:
+        per_way = functools.partial(_per_way, law_of(system, joint), values, f"joints.{joint}.friction")
+        speed, rate = (number + np.zeros(count + 1) for number in walk.slip_motion(joint))  # lanes along the last axis
+        if reverse:
+            speed, rate = -_picked(speed, ends[::-1]), _picked(rate, ends[::-1])
+        keep, gain = _mapped(per_way, _Slip.between(speed, rate, ends[:-1], length), np.ones(count))
+        deflections = _chained(keep, gain, cycle.periodic)
+        histories_of[joint] = History(per_way, speed, rate, length, deflections, cycle.periodic)
+    return histories_of
 
 
 def _mapped(per_way: PerWay, slip: _Slip, until: Number) -> tuple[Number, Number]:

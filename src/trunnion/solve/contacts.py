@@ -19,7 +19,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Frame, Screw, about, moment_at
 from trunnion.algebra.vector import Vector3, cross, dot, minus, plus, scaled
-from trunnion.joints.contact_loads import BallLoad, BearingLoad, ContactLoad, GuideLoad, PinLoad
+from trunnion.joints.contact_loads import BallLoad, BearingLoad, GuideLoad, PinLoad
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction_problem import Rubbing
@@ -156,23 +156,18 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
         unit = _mixed(axis, middle, lever, lever / helix, lead / helix)
         yield Rubbing(load, helix * turn, unit, turned, amount=lever * lever / helix)
     elif pair.slides and not walk.system.summed(joint):
-        yield _resultant(load, axis, middle, lever, (lever * turn, slide), turned & slid)
+        # along the vector of the slip; where there is none, about the axis
+        around, zero = lever * turn, turned & slid
+        square = around * around + slide * slide
+        moves = (primal(square) > 0) & np.logical_not(zero)
+        speed, share, xp = *_speed(square, moves), namespace(square)
+        cosine, sine = xp.where(moves, around * share, 1.0), xp.where(moves, slide * share, 0.0)
+        unit = _mixed(axis, middle, lever, cosine, sine)
+        yield Rubbing(load, speed, unit, zero, amount=lever * cosine, turning=xp.abs(cosine))
     else:
         yield Rubbing(load, lever * turn, moment, turned, amount=lever, turning=turning)
         if pair.slides:
             yield Rubbing(load, slide, about(axis, NULL, middle), slid, amount=0.0)
-
-
-def _resultant(
-    load: ContactLoad, axis: Vector3, middle: Vector3, lever: Number, slip: tuple[Number, Number], zero: Number
-) -> Rubbing:
-    """Friction along the vector of the slip; where there is none, about the axis."""
-    square = slip[0] * slip[0] + slip[1] * slip[1]
-    moves = (primal(square) > 0) & np.logical_not(zero)
-    speed, share, xp = *_speed(square, moves), namespace(square)
-    cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)
-    unit = _mixed(axis, middle, lever, cosine, sine)
-    return Rubbing(load, speed, unit, zero, amount=lever * cosine, turning=xp.abs(cosine))
 
 
 def _speed(square: Number, moves: Number) -> tuple[Number, Number]:

@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.algebra.panels import ON_GRID
@@ -257,7 +257,7 @@ def _least(coefficients: Array) -> tuple[Array, Array, Array]:
 
 def plain(number: Number) -> float:
     """A number that does not change along the way."""
-    return float(np.ravel(np.asarray(primal(number), float))[0])
+    return single(number)
 
 
 def _size(vector: Array, axis: int = 0) -> Array:
@@ -268,16 +268,6 @@ def loads_of(back: Backward, seat: GivenSeat) -> list[tuple[Number, ...]]:
     """Load of the pin on each end of its hole, N, in the hole's frame."""
     force, moment = back.on_hole(seat.joint)
     return seat.play.model.loads(force, moment, seat.play.length)
-
-
-def _sensed(run: Run) -> list[str]:
-    """Joints whose sense of motion decides a friction or a load, each contact of them that of one freedom."""
-    system, joints = run.system, []
-    for joint in dict.fromkeys([*rubbing(system), *system.resisted]):
-        pair, summed = PAIRS[system.joints[joint][0]], system.summed(joint) and joint not in system.resisted
-        if pair.one_axis and (len(pair.freedoms) == 1 or summed):
-            joints.append(joint)
-    return joints
 
 
 def reactions(back: Backward, loads: Sequence[Number]) -> Number:
@@ -293,8 +283,12 @@ def end_loads(run: Run, method: FrictionMethod) -> EndLoads:
 
 
 def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
-    seats, joints = sorted(run.seats, key=lambda seat: seat.given is not None), _sensed(run)
+    seats, joints = sorted(run.seats, key=lambda seat: seat.given is not None), list[str]()
     system, count = run.system, run.system.mechanism.coordinates
+    for joint in dict.fromkeys([*rubbing(system), *system.resisted]):  # each contact of them is that of one freedom
+        pair, summed = PAIRS[system.joints[joint][0]], system.summed(joint) and joint not in system.resisted
+        if pair.one_axis and (len(pair.freedoms) == 1 or summed):
+            joints.append(joint)
     ends, first = [], 0
     for seat in seats:
         for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
@@ -306,7 +300,10 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
         senses[joint] = slice(last, last := last + len(PAIRS[system.joints[joint][0]].freedoms))
     vectors = [[[first + 1 + count * i + k for k in range(count)]] for i in range(len(system.joints))]
     if system.mechanism.space == "spatial":
-        vectors = [_on_ends([end for end in ends if end.seat.joint == joint]) for joint in system.joints]
+        sides = [[(end.seat.play.model.ends[end.number][0][0], end) for end in ends if end.seat.joint == joint]
+                 for joint in system.joints]  # fmt: skip
+        both = ([[row for at, end in of for row in end.rows if at == side] for side in "12"] for of in sides)
+        vectors = [[rows for rows in pair if rows] for pair in both]  # of the force on either end, across the axis
 
     def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
         back = run.solve(time, method=method)
@@ -324,10 +321,3 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
     return EndLoads(
         run, courses, [end for end in ends if end.radius > 0 and end.seat.given is None], first, senses, vectors
     )
-
-
-def _on_ends(ends: Sequence[End]) -> list[list[int]]:
-    """Rows of the force on either end of a pin, across its axis."""
-    places = [end.seat.play.model.ends[end.number][0][0] for end in ends]
-    rows = ([row for end, at in zip(ends, places, strict=True) if at == place for row in end.rows] for place in "12")
-    return [part for part in rows if part]

@@ -504,17 +504,7 @@ class SpatialWalk(Forward):
         return wrench
 
     def inertia_moment(self, link: str) -> Any:
-        """−(J ω̇ + ω × J ω) about the mass centre, N m; None of a link without inertia.  [P 21]"""
-        tensor = self._tensor(link)
-        if tensor is None:
-            return None
-        frame, twist, second = self.motions[link]
-        back = space.Frame(*transpose(frame[:3]), space.NULL)
-        w, change = space.rotated(back, twist.u), space.rotated(back, second.u)
-        return scaled(-1.0, space.rotated(frame, plus(apply(tensor, change), cross(w, apply(tensor, w)))))
-
-    def _tensor(self, link: str) -> Matrix3 | None:
-        """Inertia of a link about its mass centre in its own axes, kg m²; None if it has none."""
+        """−(J ω̇ + ω × J ω) about the mass centre, N m, J in the link's own axes; None of a link without.  [P 21]"""
         link_entry, values = self.system.mechanism.effective_links[link], self.values
         if not isinstance(link_entry.inertia, InertiaTensor):
             return None
@@ -523,7 +513,11 @@ class SpatialWalk(Forward):
             mass, (x, y, z) = values[f"links.{link}.mass"], self.system.centre(values, link)
             xx, yy, zz = xx - mass * (y * y + z * z), yy - mass * (x * x + z * z), zz - mass * (x * x + y * y)
             xy, xz, yz = xy + mass * x * y, xz + mass * x * z, yz + mass * y * z
-        return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+        tensor: Matrix3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        frame, twist, second = self.motions[link]
+        back = space.Frame(*transpose(frame[:3]), space.NULL)
+        w, change = space.rotated(back, twist.u), space.rotated(back, second.u)
+        return scaled(-1.0, space.rotated(frame, plus(apply(tensor, change), cross(w, apply(tensor, w)))))
 
 
 def _dual_angle(first: space.Frame, second: space.Frame) -> tuple[Number, Number]:

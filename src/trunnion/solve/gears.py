@@ -105,20 +105,13 @@ def gear_load(walk: Forward, number: int, i: int, effort: Number, along: Number)
         if turned_round:  # on the gear that the file names first
             force = -force[0], -force[1]
     elif gear.slide is not None:
-        total = _on_second(done)
+        total = dict.fromkeys((joint for joint, _ in gear.joints), ZERO_LOAD)  # on the second link of each joint
+        for joint, side, wrench in done:
+            total[joint] = added(total[joint], wrench) if side == 1 else total[joint]
         x, y, _ = total[gear.joints[gear.slide][0]]
         return GearLoad(total[gear.joints[1 - gear.slide][0]].m, (x, y)), done
     in_first = turned_round if gear.slide is None else gear.slide == 1
     return GearLoad(-effort * walk.poses[number].ratios[i] if in_first else effort, force), done
-
-
-def _on_second(done: Sequence[ToothForce]) -> dict[int, Wrench]:
-    """All that a gear pair does to the second link of each of its joints."""
-    total: dict[int, Wrench] = {}
-    for joint, side, wrench in done:
-        if side == 1:
-            total[joint] = added(total.get(joint, ZERO_LOAD), wrench)
-    return total
 
 
 def power_of(walk: Forward, number: int, done: Sequence[ToothForce]) -> Number:

@@ -13,7 +13,7 @@ sense round, for the little while before or after the joint does, no seat agrees
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -32,7 +32,6 @@ from trunnion.solve.end_loads import NO_LOAD, EndLoads, end_loads, loads_of, pla
 from trunnion.solve.forward import Travel, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.switches import accuracy_of, breaks_between
-from trunnion.solve.system import Values
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
@@ -117,7 +116,7 @@ class Seating:
         time = self._within(time)
         rows, states, still = self._rows(time), self.states(time), self.run.system.algebra.STILL
         added = iter(np.where(states == SETTLED, rows[len(self.paths) :], 0.0))
-        travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
+        travel = {link: _shaped(still, added) for link in self.links}
         back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
         return Seated(back, states, self.sticks(time), self.rounds[self.courses.panel(time)])
 
@@ -323,15 +322,19 @@ class _Settling:
         rates, back = courses.rates(offsets, settled), self._static(time, offsets)
         static, middle = back.walk.motions, run.walk(time).motions
         places = {path: Dual(*both) for path, *both in zip(self.paths, offsets, rates, strict=True)}
-        twists = _added_twists(run, {**run.values, **self.fixed, **places}, time) if np.any(rates) else {}
+        twists: dict[str, Any] = {}  # of every link by the ε parts of the offsets; poses alone are worked out
+        if np.any(rates):
+            walk = posed(run.system, {**run.values, **self.fixed, **places}, time=time, assembly=run.chosen.assembly)
+            fixed = run.system.mechanism.fixed_link
+            twists = {link: walk.frame_rate(motion.frame) for link, motion in walk.motions.items() if link != fixed}
+            for number, pose in enumerate(walk.poses):
+                twists |= walk.unspun(number, pose, twists)
         travel, more = {}, np.zeros((0, len(time)))
         for link, twist in twists.items():
             rows = [_rows(part, time) for part in (twist, *static[link][1:], *middle[link][1:])]
             added = courses.rates(rows[1] + rows[0] - rows[3], settled) + rows[4] - rows[2]
             both = np.nan_to_num([rows[0], added])
-            travel[link] = Travel(
-                *(_shaped(part, numbers) for part, numbers in zip(static[link][1:], both, strict=True))
-            )
+            travel[link] = _shaped(static[link][1:], iter(both.reshape(-1, len(time))))
             more = np.concatenate([more, *both])
         moving = run.at(time, self._placed(offsets), self.method, travel=travel)
         joints = dict.fromkeys(end.seat.joint for end, _ in self.loads.pressed)
@@ -380,10 +383,9 @@ def _rows(numbers: Any, time: Array) -> Array:
     return np.array([np.broadcast_to(primal(number), time.shape) for number in flat(numbers)], float)
 
 
-def _shaped(like: Any, rows: Array) -> Any:
-    """Rows as the numbers of such a tuple."""
-    parts = iter(rows)
-    return each(like, lambda _: next(parts))
+def _shaped(like: Any, rows: Iterator[Array]) -> Travel:
+    """Rows as the numbers of a twist and an acceleration."""
+    return Travel(*each(like, lambda _: next(rows)))
 
 
 def _share(back: Backward, joint: str) -> Number | None:
@@ -399,13 +401,3 @@ def _share(back: Backward, joint: str) -> Number | None:
     factor = back.walk.values.get(f"joints.{joint}.friction.pair_factor", 1.0)
     slope, slip = back.turning[joint]
     return -primal(slope) * np.sign(primal(slip)) / factor
-
-
-def _added_twists(run: Run, values: Values, time: Array) -> dict[str, Any]:
-    """Twist of every link by the ε parts of the values; poses alone are worked out."""
-    walk = posed(run.system, values, run.chosen.assembly, time)
-    links = [link for link in walk.motions if link != run.system.mechanism.fixed_link]
-    twists = {link: walk.frame_rate(walk.motions[link].frame) for link in links}
-    for number, pose in enumerate(walk.poses):
-        twists.update(walk.unspun(number, pose, twists))
-    return twists

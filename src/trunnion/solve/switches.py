@@ -146,10 +146,13 @@ def tracked(of: Mechanisms, bends: Sequence[Bend], moved: Callable[[Values, Arra
     They are times of the one, `moved` to those of the others by their values; cycles: that of the one, for each.
     """
     cycle, tracks = of.cycles[0], np.tile([bend.time for bend in bends], (len(of.cycles), 1))
-    widths, levels = np.array([_width(bend, bends, cycle) for bend in bends]), np.array([bend.level for bend in bends])
+    levels, most = np.array([bend.level for bend in bends]), cycle.duration / (TRACKED * max(1.0, cycle.turns))
+    like = [[other for other in bends if other[1:3] == bend[1:3] and other is not bend] for bend in bends]
+    # to either side of each, and not beyond the next one of its kind
+    widths = [min([most, *(abs(of.time - b.time) / 2 for of in near)]) for b, near in zip(bends, like, strict=True)]
     for scan, rows, function, which in _by_scan(of, bends):
         number = partial(_moved, of, scan, moved, rows, function)
-        low, high = (tracks[rows, which] + side * widths[which] for side in (-1.0, 1.0))
+        low, high = (tracks[rows, which] + side * np.array(widths)[which] for side in (-1.0, 1.0))
         crossing = _Crossing(rows, function, levels[which], low, high, number(low), number(high))
         passed = (crossing.at_low >= crossing.level) != (crossing.at_high >= crossing.level)
         times = _located(crossing, number, np.full(len(rows), cycle.duration))
@@ -199,12 +202,6 @@ def _moved(
     cycle = of.cycles[0]
     time = time % cycle.duration if cycle.periodic else np.clip(time, 0.0, cycle.duration)
     return scan.number(of, rows, function, np.asarray(primal(moved(of.picked(rows), time[:, None])), float)[:, 0])
-
-
-def _width(of: Bend, bends: Sequence[Bend], cycle: Cycle) -> float:
-    """How far to either side of a bend it is looked for in other mechanisms, s: not beyond the next one of its kind."""
-    like = [abs(bend.time - of.time) / 2 for bend in bends if bend[1:3] == of[1:3] and bend is not of]
-    return min(cycle.duration / (TRACKED * max(1.0, cycle.turns)), *like, cycle.duration)
 
 
 def breaks_between(cycle: Cycle, times: Array, start: float = 0.0, end: float | None = None) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -161,11 +161,19 @@ class System:
 
     @cached_property
     def places(self) -> tuple[tuple[Place, ...], ...]:
-        """The joints of each module, then its witnesses."""
-        return tuple(
-            tuple(self._place(module, name) for name in (*module.joints, *module.witnesses))
-            for module in self.plan.modules
-        )
+        """The joints of each module, then its witnesses; in space a module takes its joints as they are."""
+        rows = []
+        for module in self.plan.modules:
+            turned = {} if self.spatial else dict(zip(module.joints, module.reversed_, strict=True))
+            row = []
+            for name in (*module.joints, *module.witnesses):
+                kind, (first, second) = self.joints[name]
+                reversed_ = turned.get(name, False)
+                links = (second, first) if reversed_ else (first, second)
+                outer = (links[0] not in module.links, links[1] not in module.links)
+                row.append(Place(name, kind, links, outer, reversed_))
+            rows.append(tuple(row))
+        return tuple(rows)
 
     @cached_property
     def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
@@ -199,37 +207,25 @@ class System:
             points += [(link, joint) for joint, (_, links) in self.joints.items() for link in links]
         return tuple(dict.fromkeys(points))
 
-    def _place(self, module: Module, name: str) -> Place:
-        kind, (first, second) = self.joints[name]
-        # in space a module takes its joints as they are
-        reversed_ = not self.spatial and name in module.joints and module.reversed_[module.joints.index(name)]
-        links = (second, first) if reversed_ else (first, second)
-        outer = (links[0] not in module.links, links[1] not in module.links)
-        return Place(name, kind, links, outer, reversed_)
-
     def _group(self, module: Module, places: Sequence[Place]) -> Any:
         if module.kind in GROUPS:
             return GROUPS[module.kind]
         number, names = {link: i for i, link in enumerate(module.links)}, [place.joint for place in places]
-        sides = ([number.get(link, OUTER) for link in place.links] for place in places)
-        joints = tuple(GroupJoint(place.kind, (a, b)) for place, (a, b) in zip(places, sides, strict=True))
+        ends = ([number.get(link, OUTER) for link in place.links] for place in places)
+        joints = tuple(GroupJoint(place.kind, (a, b)) for place, (a, b) in zip(places, ends, strict=True))
         driven = tuple(names.index(name) for name in module.driven)
         if not self.spatial:
             gears = tuple(self._gear(name, names) for name in module.gears)
             return General(len(module.links), joints, driven, gears, redundant=module.redundant)
-        if module.kind == "CCC" and not self._parallel(module):
-            return CylindricalDyad(2, joints)
+        if module.kind == "CCC":
+            elements = self.elements(self.mechanism.parameters())
+            sides = (
+                [elements[link, name].z for name in names if link in self.joints[name][1]] for link in module.links
+            )
+            if all(abs(float(dot(first, second))) <= 1 - 1e-12 for first, second in sides):  # else no closed form
+                return CylindricalDyad(2, joints)
         spins = tuple((number[link], names.index(a), names.index(b)) for link, a, b in module.spinning)
         return SpatialGroup(len(module.links), joints, driven, spins, redundant=module.redundant)
-
-    def _parallel(self, module: Module) -> bool:
-        """Whether the two axes of a link of a cylindrical dyad are parallel: it has no closed form then."""
-        elements = self.elements(self.mechanism.parameters())
-        for link in module.links:
-            first, second = (elements[link, joint].z for joint in module.joints if link in self.joints[joint][1])
-            if abs(float(dot(first, second))) > 1 - 1e-12:
-                return True
-        return False
 
     def _gear(self, name: str, names: Sequence[str]) -> GearPair:
         first, second = (names.index(joint) for joint in self.gear_joints(name))
@@ -314,26 +310,22 @@ class System:
         """The same without errors of joints; c, s in the plane and z in space is the direction of the joint."""
         if self.mechanism.loop:
             return self._loop_elements(values)
-        read_element = self._element_in_space if self.spatial else self._element_in_plane
-        return {
-            (link, name): read_element(values, link, name) for name, (_, links) in self.joints.items() for link in links
-        }
-
-    def _element_in_plane(self, values: Values, link: str, joint: str) -> plane.Frame:
-        path = f"links.{link}.points.{joint}"
-        x, y = values[f"{path}.x"], values[f"{path}.y"]
-        if "planar" not in PAIRS[self.joints[joint][0]].needs_axis:
-            return plane.Frame(x, y)
-        ax, ay = values[f"{path}.axis.x"], values[f"{path}.axis.y"]
-        length = namespace(ax, ay).hypot(ax, ay)
-        return plane.Frame(x, y, ax / length, ay / length)
-
-    def _element_in_space(self, values: Values, link: str, joint: str) -> space.Frame:
-        point, path = self.mechanism.links[link].points[joint], f"links.{link}.points.{joint}"
-        axis: Any = self.vector(values, f"{path}.axis") if point.axis is not None else (0.0, 0.0, 1.0)
-        x: Any = self.vector(values, f"{path}.x") if point.x is not None else None
-        place: Any = self.vector(values, path)
-        return space.element(place, axis, x)
+        elements: dict[tuple[str, str], Any] = {}
+        for name, (kind, links) in self.joints.items():
+            for link in links:
+                path, point = f"links.{link}.points.{name}", self.mechanism.links[link].points[name]
+                place: Any = self.vector(values, path)
+                if self.spatial:
+                    axis: Any = self.vector(values, f"{path}.axis") if point.axis is not None else (0.0, 0.0, 1.0)
+                    x: Any = self.vector(values, f"{path}.x") if point.x is not None else None
+                    elements[link, name] = space.element(place, axis, x)
+                elif "planar" in PAIRS[kind].needs_axis:
+                    ax, ay = self.vector(values, f"{path}.axis")
+                    length = namespace(ax, ay).hypot(ax, ay)
+                    elements[link, name] = plane.Frame(place[0], place[1], ax / length, ay / length)
+                else:
+                    elements[link, name] = plane.Frame(place[0], place[1])
+        return elements
 
     def _loop_elements(self, values: Values) -> dict[tuple[str, str], space.Frame]:
         """Elements from the dual Denavit–Hartenberg table: joint k is Z(θ̂), the link after it X(α̂) to joint k + 1."""
@@ -508,7 +500,14 @@ class System:
         free_drivers = {name for name, driver in drivers.items() if free and driver.found}
         counted = spans.keys() - free_drivers or spans.keys()  # of free ones only where all are free
         longest = float(max(spans[name].duration for name in counted))
-        findings = list(self._backward_ranges(nominal, spans))
+        findings = []
+        for name, span in spans.items():  # those whose range runs against their speed
+            if span.duration < 0:
+                speed = nominal[f"drivers.{name}.speed"]
+                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
+                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
+                remedy = "swap the ends of the range, or the sign"
+                findings.append(Finding(what, f"drivers.{name}.range", remedy))
         ending = [name for name, span in spans.items() if not span.periodic]
         for name in ending if not findings else ():
             span = spans[name]
@@ -521,7 +520,9 @@ class System:
         periods = [longest / span.duration for span in spans.values()]
         if self.mechanism.gears:
             periods += self.geared_turns(values, longest, turns).values()
-        count = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
+        fits = (np.array(periods) * n for n in range(1, COMMON_TURNS + 1))
+        whole = (np.abs(laps - np.round(laps)) < 1e-9 * np.maximum(1.0, laps) for laps in fits)
+        count = next((n for n, good in enumerate(whole, 1) if np.all(good)), 0)
         periodic = bool(count and not ending)
         duration = count * longest if periodic else longest
         # turns that a driver would make at its largest rate; of a slide, how often it would travel or turn its wheel
@@ -532,15 +533,6 @@ class System:
                 ways[slide] = min(ways[slide], around)
         turns_made = max(float(spans[name].peak * duration / travel) for name, travel in ways.items())
         return Cycle(duration, periodic, turns_made)
-
-    def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:
-        """Drivers whose range runs against their speed."""
-        for name, span in spans.items():
-            if span.duration < 0:
-                speed = nominal[f"drivers.{name}.speed"]
-                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
-                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
-                yield Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign")
 
     def geared_turns(
         self, values: Values, duration: float, others: Mapping[str, float] | None = None
@@ -576,18 +568,17 @@ def _widest(links: Sequence[Sequence[Sequence[Number]]]) -> Number:
 
 def build(mechanism: Mechanism, inverse: Outputs | None = None) -> System:
     """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
-    if mechanism.space == "spatial" and (findings := list(_bristles(mechanism))):
-        raise MechanismError(findings)
-    return System(mechanism, decompose(mechanism), inverse)
-
-
-def _bristles(mechanism: Mechanism) -> Iterator[Finding]:
-    """Laws with bristles in pairs whose slip has no one direction: a deflection is followed along one way only."""
-    for name, joint in mechanism.effective_joints.items():
+    findings = []
+    for name, joint in mechanism.effective_joints.items() if mechanism.space == "spatial" else ():
         law = joint.friction.law if joint.friction else None
         if law and FRICTION_LAWS[law].relaxation is not None and PAIRS[joint.type].count > 1:
+            # a deflection is followed along one way only
             what = f"the bristles of the law {law} bend in one direction, the slip of a {joint.type} joint has several"
-            yield Finding(what, f"joints.{name}.friction", "use coulomb, viscous, stribeck or brown-mcphee here")
+            remedy = "use coulomb, viscous, stribeck or brown-mcphee here"
+            findings.append(Finding(what, f"joints.{name}.friction", remedy))
+    if findings:
+        raise MechanismError(findings)
+    return System(mechanism, decompose(mechanism), inverse)
 
 
 def freed(values: Values, motions: Mapping[str, tuple[Number, Number, Number]]) -> dict[str, Number]:
@@ -622,10 +613,6 @@ def driven_coordinates(
         rate += [ratio, 0.0, 0.0]
         second += [ratio, 0.0, 0.0]
     return q, rate, second
-
-
-def _is_whole(number: float) -> bool:
-    return abs(number - round(number)) < 1e-9 * max(1.0, number)
 
 
 def rubbing(system: System) -> list[str]:

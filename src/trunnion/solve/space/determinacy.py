@@ -95,8 +95,15 @@ def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -
     ranks = np.where(finite, np.sum(sizes > RANK * sizes[:, :1], axis=-1), -1)
     rank = int(np.max(ranks))
     regular = ranks == rank
-    stresses = [_stress(group, pose, null) for null in np.moveaxis(left, -1, 0)[rank:]]
-    motions = [_motion(group, pose, null) for null in np.moveaxis(right, -2, 0)[rank:]]
+    stresses, motions, none = list[Array](), list[Array](), [group.algebra.ZERO_LOAD] * group.links
+    for null in np.moveaxis(left, -1, 0)[rank:]:  # the wrenches of a self-stress, (joint, 6 or 3, lane)
+        wrenches = group.link_by_link(pose, none, list(null.T))
+        stresses.append(_table([group.at_joint(pose, k, wrenches[k]) for k in range(len(group.joints))], lanes))
+    for null in np.moveaxis(right, -2, 0)[rank:]:  # the twists of a motion that nothing determines
+        rates = group.unmoved()
+        for (k, i), rate in zip(group.free, null.T, strict=True):
+            rates[k][i] = rate
+        motions.append(_table(group.twists(pose, [None] * len(group.joints), rates), lanes))
     normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
     strained, pressed = (_present(module.joints, parts, stresses, regular) for parts in (stresses, normals))
     return ModuleDeterminacy(
@@ -199,20 +206,6 @@ def _by_least_squares(walk: Forward, number: int, group: Tree) -> Pose | None:
         ranks = np.linalg.matrix_rank(np.broadcast_to(table, (TRIES, *table.shape[1:]))[closed], rtol=RANK)
         best = closed[int(np.argmax(ranks))]
         return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
-
-
-def _stress(group: Tree, pose: Pose, null: Array) -> Array:
-    """(joint, 6 or 3, lane): the wrenches of a self-stress. null: (lane, row)."""
-    wrenches = group.link_by_link(pose, [group.algebra.ZERO_LOAD] * group.links, list(null.T))
-    return _table([group.at_joint(pose, k, wrenches[k]) for k in range(len(group.joints))], len(null))
-
-
-def _motion(group: Tree, pose: Pose, null: Array) -> Array:
-    """(link, 6 or 3, lane): the twists of a motion that nothing determines, J q̇ = 0. null: (lane, column)."""
-    rates: list[list[Number]] = [[0.0] * len(screws) for screws in pose.screws]
-    for (k, i), rate in zip(group.free, null.T, strict=True):
-        rates[k][i] = rate
-    return _table(group.twists(pose, [None] * len(group.joints), rates), len(null))
 
 
 def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: Number, stress: Array) -> Array:

@@ -39,7 +39,7 @@ from trunnion.groups.tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve import shifts
-from trunnion.solve.assembly import Chosen, choose
+from trunnion.solve.assembly import choose
 from trunnion.solve.forward import posed, start
 from trunnion.solve.hints import distance
 from trunnion.solve.space.determinacy import look
@@ -317,7 +317,11 @@ def _solve(linear: LinearLoops, c: Array, ask: Ask, size: float) -> ConeAnswer |
     share = float(np.max(ask.share, initial=0.0))
     if share == 0:
         return None
-    rows, right = _cones(ask, columns, share, length)
+    # rows A x + s = b of the ends: s = (b_i + t s_i, c_i)
+    firsts = np.cumsum([0, *(width + 1 for width in ask.widths[:-1])])
+    rows, right = np.zeros((components + ends, columns + components + 1)), np.zeros(components + ends)
+    rows[firsts, -1], right[firsts] = -ask.share / share, ask.base / length
+    rows[np.setdiff1d(np.arange(len(rows)), firsts), columns + np.arange(components)] = -1.0
     table = np.zeros((len(gap), columns + components + 1))
     table[:, :columns], table[:, columns:-1] = jacobian, effect / lever
     aim = np.zeros(table.shape[1])
@@ -326,55 +330,26 @@ def _solve(linear: LinearLoops, c: Array, ask: Ask, size: float) -> ConeAnswer |
     matrix = sparse.csc_matrix(np.vstack([table, rows]))
     none = sparse.csc_matrix((len(aim), len(aim)))
     b = np.concatenate([side / unit, right])
-    solution = clarabel.DefaultSolver(none, aim, matrix, b, cones, _settings()).solve()
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.max_iter = False, 100
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = FINE
+    solution = clarabel.DefaultSolver(none, aim, matrix, b, cones, settings).solve()
     if str(solution.status) not in SOUND:
         return None
     x, z = np.asarray(solution.x), np.asarray(solution.z)
-    firsts = len(gap) + np.cumsum([0, *(width + 1 for width in ask.widths[:-1])])
     return ConeAnswer(
         unit * x[:columns],
         length * x[columns:-1],
         length / share * float(x[-1]),
         length / share * float(solution.obj_val_dual),
-        z[firsts] * ask.share / share,
+        z[len(gap) + firsts] * ask.share / share,
     )
-
-
-def _cones(ask: Ask, columns: int, share: float, length: float) -> tuple[Array, Array]:
-    """Rows A x + s = b of the ends: s = (b_i + t s_i, c_i)."""
-    count = sum(ask.widths)
-    rows, right = np.zeros((count + len(ask.widths), columns + count + 1)), np.zeros(count + len(ask.widths))
-    row, column = 0, columns
-    for base, share_of, width in zip(ask.base, ask.share, ask.widths, strict=True):
-        rows[row, -1], right[row] = -share_of / share, base / length
-        for k in range(width):
-            rows[row + 1 + k, column + k] = -1.0
-        row, column = row + width + 1, column + width
-    return rows, right
-
-
-def _settings() -> clarabel.DefaultSettings:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = FINE
-    settings.max_iter = 100
-    return settings
 
 
 # ---- where to start -------------------------------------------------------------------------------------------------
 
 
 Start = Callable[[Array], Array]  # coordinates (lane, kept) near those of the closed loops at times, s, or NaN
-
-
-def _ideal(system: System, values: Values, chosen: Chosen) -> Start:
-    """Those of the mechanism without errors, which closes."""
-
-    def coordinates(time: Array) -> Array:
-        pose = posed(system, values, chosen.assembly, time).poses[0]
-        return np.stack([np.broadcast_to(pose.q[i], time.shape) for i in system.groups[0].kept], axis=-1)
-
-    return coordinates
 
 
 def start_of(system: System, values: Values, ideal: Values, cycle: Cycle) -> tuple[Start, list[Finding]]:
@@ -387,7 +362,13 @@ def start_of(system: System, values: Values, ideal: Values, cycle: Cycle) -> tup
     if wrong:
         raise MechanismError(wrong)
     if chosen.found[0]:
-        return _ideal(system, ideal, chosen), list(chosen.findings)
+        kept = system.groups[0].kept
+
+        def closing(time: Array) -> Array:
+            pose = posed(system, ideal, chosen.assembly, time).poses[0]
+            return np.stack([np.broadcast_to(pose.q[i], time.shape) for i in kept], axis=-1)
+
+        return closing, list(chosen.findings)
     nearly = _followed(system, values, cycle)
     what = "the stated axes and lengths do not close the loops, even without the errors"
     remedy = "errors count from the position with the smallest opening; state the difference as misalignment or "

@@ -52,16 +52,19 @@ class Spline(NamedTuple):
         return row
 
 
-def spline(knots: Sequence[Number], values: Sequence[Number], ends: Ends) -> Spline:
+def spline(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:
     """The twice continuously differentiable spline through at least two points, three if periodic.
 
     ends: clamped has slope 0 there, natural no curvature, periodic the same slope and curvature at both (its
-    values may differ: it then advances by their difference every period).
+    values may differ: it then advances by their difference every period); None: straight lines between the points.
+    That of plain numbers is kept, with its table.
     Source: C. de Boor, A Practical Guide to Splines, Springer 1978, chapter IV: continuity of the second
     derivative, h = distance of the knots, d = slope of the chord, m = slope of the spline:
     m₋/h₋ + 2 m (1/h₋ + 1/h₊) + m₊/h₊ = 3 (d₋/h₋ + d₊/h₊).
     """
-    return _through(knots, values, ends)
+    if all(isinstance(number, (int, float)) for number in (*knots, *values)):
+        return _plain(tuple(map(float, knots)), tuple(map(float, values)), ends)
+    return _fitted(knots, values, ends)
 
 
 def look_up(
@@ -74,24 +77,17 @@ def look_up(
     low, extent = knots[0], knots[-1] - knots[0]
     if periodic:
         place = place - extent * np.floor(primal((place - low) / extent))
-    value = _through(knots, values, ("periodic" if periodic else "natural") if smooth else None).at(place)[0]
+    value = spline(knots, values, ("periodic" if periodic else "natural") if smooth else None).at(place)[0]
     if periodic:
         return value
     share = primal((place - low) / extent)
     return namespace(value).where((share >= -SLACK) & (share <= 1 + SLACK), value, np.nan)
 
 
-def _through(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:
-    """A spline through points, or straight lines between them; that of plain numbers is kept, with its table."""
-    if all(isinstance(number, (int, float)) for number in (*knots, *values)):
-        return _plain(tuple(map(float, knots)), tuple(map(float, values)), ends)
-    return _fitted(knots, values, ends)
-
-
 @functools.lru_cache(maxsize=64)
 def _plain(knots: tuple[float, ...], values: tuple[float, ...], ends: Ends | None) -> Spline:
-    spline = _fitted(knots, values, ends)
-    return spline._replace(table=np.array(spline.rows).T.copy())
+    fitted = _fitted(knots, values, ends)
+    return fitted._replace(table=np.array(fitted.rows).T.copy())
 
 
 def _fitted(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:

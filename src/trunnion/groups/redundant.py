@@ -11,6 +11,7 @@ only: a small change of a dimension takes such a linkage apart, so there is no d
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
 
@@ -35,24 +36,32 @@ def stacked(matrix: Sequence[Sequence[Number]]) -> Array:
     return cast(Array, table.reshape(*table.shape[:-1], len(matrix), len(matrix[0])))
 
 
+def _finite(*tables: Array) -> tuple[NDArray[np.bool_], list[Array]]:
+    """Lanes in which an entry is not finite, and the tables with 0 in these."""
+    bad = np.asarray(~functools.reduce(operator.and_, (np.isfinite(table).all(axis=(-2, -1)) for table in tables)))
+    return bad, [np.where(bad[..., None, None], 0.0, table) for table in tables]
+
+
+def _rows(table: NDArray[Any], bad: NDArray[np.bool_], matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    """A result as rows; NaN in bad lanes, and for its dual parts."""
+    table[bad] = np.nan
+    dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
+    rows = [[table[..., i, j] for j in range(table.shape[-1])] for i in range(table.shape[-2])]
+    return [[Dual(entry, np.nan) for entry in row] for row in rows] if dual else rows
+
+
 def pseudo_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
     """J⁺ as rows; NaN where an entry is."""
-    table = stacked(matrix)
-    bad = np.asarray(~np.isfinite(table).all(axis=(-2, -1)))
-    inverse = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK)
-    inverse[bad] = np.nan
-    dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
-    rows = [[inverse[..., i, j] for j in range(inverse.shape[-1])] for i in range(inverse.shape[-2])]
-    return [[Dual(entry, np.nan) for entry in row] for row in rows] if dual else rows
+    bad, (table,) = _finite(stacked(matrix))
+    return _rows(np.linalg.pinv(table, rcond=RANK), bad, matrix)
 
 
 def condition(matrix: Sequence[Sequence[Number]]) -> Array:
     """2/n √(Σ σ²) √(Σ 1/σ²) over the n singular values, ∞ where a freedom is not determined, NaN where an entry is."""
-    table = stacked(matrix)
-    bad = np.asarray(~np.isfinite(table).all(axis=(-2, -1)))
-    values = np.linalg.svd(np.where(bad[..., None, None], 1.0, table), compute_uv=False)
+    bad, (table,) = _finite(stacked(matrix))
+    values = np.linalg.svd(table, compute_uv=False)
     columns = table.shape[-1]
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         lost = (values[..., -1] <= RANK * values[..., 0]) | (values.shape[-1] < columns)
         number = 2 / columns * np.sqrt(np.sum(values**2, axis=-1) * np.sum(1 / values**2, axis=-1))
     return np.where(bad, np.nan, np.where(lost, np.inf, number))
@@ -60,14 +69,8 @@ def condition(matrix: Sequence[Sequence[Number]]) -> Array:
 
 def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) -> list[Number]:
     """x of least |A x − b|, and of those the shortest."""
-    table = stacked(matrix)
-    right = stacked([[entry] for entry in side])
-    bad = np.asarray(~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(right).all(axis=(-2, -1))))
-    solution = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK) @ right
-    solution[bad] = np.nan
-    dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
-    values = [solution[..., i, 0] for i in range(solution.shape[-2])]
-    return [Dual(value, np.nan) for value in values] if dual else values
+    bad, (table, right) = _finite(stacked(matrix), stacked([[entry] for entry in side]))
+    return [row[0] for row in _rows(np.linalg.pinv(table, rcond=RANK) @ right, bad, matrix)]
 
 
 class Support(NamedTuple):
@@ -123,9 +126,7 @@ def least(
         columns.append(reactions(unit, False))
     shape = np.broadcast_shapes(start.shape, *(column.shape for column in columns))
     effect = np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
-    table = stacked(jacobian)
-    bad = np.asarray(~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(start).all(axis=-1)))
-    safe = np.where(bad[..., None, None], 0.0, table)
+    bad, (safe, _) = _finite(stacked(jacobian), start[..., None])
     project = np.eye(count) - safe @ np.linalg.pinv(safe, rcond=RANK)  # onto the null space of Jᵀ
     moves = np.where(bad[..., None, None], 0.0, effect @ project)
     target = np.where(bad[..., None], 0.0, np.broadcast_to(start, shape))

@@ -206,6 +206,11 @@ def directed(parameters: Mapping[str, Number], slip: Number) -> Mapping[str, Num
 _COEFFICIENT = LawParameter(meaning="friction coefficient of sliding")
 _BACKWARD = LawParameter(meaning="coefficient of negative rates; that of positive ones if not stated", optional=True)
 _STATIC = LawParameter(meaning="friction coefficient at rest, not below that of sliding")
+_PAIR_FACTOR = LawParameter(
+    default=1.0, meaning="factor from the material's coefficient to the pair's (4/3 when worn in)"
+)
+_BRISTLED = LawParameter(minimum=1e-12, meaning="friction coefficient of sliding")
+_STRIBECK_SPEED = LawParameter("m/s", minimum=1e-12, meaning="speed at which the peak at rest has decayed")
 _VISCOUS = LawParameter("s/m", default=0.0, meaning="growth of the coefficient with the slip speed")
 
 FRICTION_LAWS: dict[str, FrictionLaw] = {
@@ -214,9 +219,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         {
             "coefficient": LawParameter(meaning="friction coefficient of the material pairing"),
             "backward": _BACKWARD,
-            "pair_factor": LawParameter(
-                default=1.0, meaning="factor from the material's coefficient to the pair's (4/3 when worn in)"
-            ),
+            "pair_factor": _PAIR_FACTOR,
         },
         source="Durango, Calle, Ruiz (2010), eq. 8",
         validity="dry or boundary-lubricated sliding; speed-independent",
@@ -227,7 +230,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         {
             "coefficient": _COEFFICIENT,
             "backward": _BACKWARD,
-            "pair_factor": LawParameter(default=1.0, meaning="factor from the material's coefficient to the pair's"),
+            "pair_factor": _PAIR_FACTOR,
             "viscous": LawParameter("s/m", meaning="growth of the coefficient with the slip speed"),
         },
         source="H. Olsson et al., Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X",
@@ -245,7 +248,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         {
             "coefficient": _COEFFICIENT,
             "static": _STATIC,
-            "stribeck_speed": LawParameter("m/s", minimum=1e-12, meaning="speed at which the peak at rest has decayed"),
+            "stribeck_speed": _STRIBECK_SPEED,
             "viscous": _VISCOUS,
         },
         source="B. Armstrong-Hélouvry et al., Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7",
@@ -266,7 +269,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
     "dahl": FrictionLaw(
         dahl,
         {
-            "coefficient": LawParameter(minimum=1e-12, meaning="friction coefficient of sliding"),
+            "coefficient": _BRISTLED,
             "stiffness": LawParameter("1/m", minimum=1e-6, meaning="stiffness of the contact per load"),
         },
         source="P. R. Dahl, A solid friction model, Aerospace Corporation, TOR-0158(3107-18)-1, 1968",
@@ -277,9 +280,9 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
     "lugre": FrictionLaw(
         lugre,
         {
-            "coefficient": LawParameter(minimum=1e-12, meaning="friction coefficient of sliding"),
+            "coefficient": _BRISTLED,
             "static": _STATIC,
-            "stribeck_speed": LawParameter("m/s", minimum=1e-12, meaning="speed at which the peak at rest has decayed"),
+            "stribeck_speed": _STRIBECK_SPEED,
             "stiffness": LawParameter("1/m", minimum=1e-6, meaning="stiffness of the contact per load"),
             "damping": LawParameter("s/m", default=0.0, meaning="damping of the bristles per load"),
             "viscous": _VISCOUS,

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.solve.assembly import grid, ways_of
-from trunnion.solve.forward import Forward, posed
+from trunnion.solve.forward import posed
 from trunnion.solve.hints import joint_rows, way_name
 from trunnion.solve.run import Run
 from trunnion.solve.track import Passing, Track
@@ -65,13 +64,8 @@ def choices(run: Run) -> tuple[GroupModes, ...]:
     """
     if max(run.chosen.found, default=0) < 2:
         return ()
-    times = grid(run.cycle)
+    times, groups, hints_stated = grid(run.cycle), list[GroupModes](), run.system.mechanism.assembly
     walk = posed(run.system, run.values, run.chosen.assembly, times)
-    return tuple(_modes(run, walk, times))
-
-
-def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[GroupModes]:
-    hints_stated = run.system.mechanism.assembly
     for number, module in enumerate(run.system.plan.modules):
         assembly, count = run.chosen.assembly[number], run.chosen.found[number]
         if count < 2:
@@ -99,7 +93,8 @@ def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[Grou
         if lane:
             dial = run.system.dial(run.values, times[lane : lane + 1])
             where = dial.at(0) + (f" of {dial.of}" if dial.of else "")
-        yield GroupModes(number, module.label, module.links, link, float(times[lane]), where, tuple(ways))
+        groups.append(GroupModes(number, module.label, module.links, link, float(times[lane]), where, tuple(ways)))
+    return tuple(groups)
 
 
 def put_together(mechanism: Mechanism, choice: GroupModes, mode: AssemblyMode) -> Mechanism:

@@ -127,7 +127,9 @@ class Generic:
         of_part: list[list[Constraint]] = [[] for _ in parts]
         for constraint, body in self.determines.items():
             of_part[part_of[body]].append(constraint)
-        weak = [k for k, links in enumerate(parts) if not self._firm(links, of_part[k])]
+        # a part is firm if its constraints leave its links no motion while all others are held
+        matrices = (self._matrix(links, of_part[k])[0] for k, links in enumerate(parts))
+        weak = [k for k, matrix in enumerate(matrices) if rank(matrix) < int(matrix.shape[1])]
         if not weak:
             return None
         after: list[set[int]] = [set() for _ in parts]
@@ -136,11 +138,6 @@ class Generic:
                 after[other].add(k)
         numbers = reached(weak, before.__getitem__), reached(weak, after.__getitem__)
         return self._finding(*({body for k in several for body in parts[k]} for several in numbers))
-
-    def _firm(self, links: Collection[str], constraints_: Iterable[Constraint]) -> bool:
-        """Whether the constraints of a part leave its links no motion while all others are held."""
-        matrix, _ = self._matrix(links, constraints_)
-        return rank(matrix) == int(matrix.shape[1])
 
     def _matrix(
         self, links: Collection[str], constraints_: Iterable[Constraint]

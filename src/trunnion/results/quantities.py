@@ -44,7 +44,7 @@ def number(value: float, digits: int = 4) -> str:
         return "—" if math.isnan(value) else ("∞" if value > 0 else "−∞")
     if value == 0:
         return "0"
-    size = math.floor(math.log10(abs(float(f"{value:.{digits}g}"))))
+    size = int(f"{value:.{digits - 1}e}".partition("e")[2])
     if not -4 <= size < 7:
         mantissa, power = f"{value:.{min(digits, 3) - 1}e}".split("e")
         return f"{mantissa}×10{str(int(power)).translate(SUPERSCRIPT)}".replace("-", "−")

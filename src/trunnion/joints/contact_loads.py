@@ -2,7 +2,7 @@
 
 A planar reaction is (F_x, F_y, M) about the joint's point, N and N m; one in space the flat tuple
 (F_x, F_y, F_z, M_x, M_y, M_z) of the wrench about the origin of the global frame. Every normal load here is a seminorm
-of it, as the certificate of `friction_problem.FrictionProblem.bound` asks.
+of it, as the certificate of `friction.FrictionProblem.bound` asks.
 
 A bearing of length L about the axis u carries the load F⊥, M⊥ across its axis, M⊥ about its middle:
 

@@ -19,9 +19,8 @@ from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.friction import directed
 from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
-from trunnion.solve.friction import Contact, Settled, settle
+from trunnion.solve.friction import Contact, Rubbing, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.gears import GearLoad, acting, gear_load, on_thread, power_of, teeth, units
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, law_parameters, rubbing

@@ -22,7 +22,7 @@ from trunnion.algebra.vector import Vector3, cross, dot, minus, plus, scaled
 from trunnion.joints.contact_loads import BallLoad, BearingLoad, GuideLoad, PinLoad
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward, SpatialWalk
-from trunnion.solve.friction_problem import Rubbing
+from trunnion.solve.friction import Rubbing
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism

@@ -12,7 +12,7 @@ from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mes
 from trunnion.groups.general import General
 from trunnion.joints.contact_loads import GuideLoad
 from trunnion.solve.forward import Forward
-from trunnion.solve.friction_problem import Contact
+from trunnion.solve.friction import Contact
 
 __all__ = ["GearLoad", "acting", "gear_load", "gears_of", "on_thread", "power_of", "teeth", "units"]
 

@@ -20,10 +20,10 @@ from trunnion.solve.friction import (
     Contact,
     FrictionProblem,
     frictionless,
+    largest,
     scaled,
     with_own,
 )
-from trunnion.solve.friction_problem import largest
 from trunnion.solve.system import Cycle
 
 __all__ = ["least_beside", "locking_margin", "margin_for_sure", "margin_in"]

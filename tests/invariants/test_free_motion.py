@@ -27,8 +27,8 @@ from timed import (
 )  # fmt: skip
 from trunnion import MechanismError, Status, analyse, read, simulate
 from trunnion.dynamics import compiled_rates
+from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.compiled_rates import CompiledRates
-from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion, Moment
@@ -155,7 +155,7 @@ def rocker(friction: float) -> Mechanism:
 def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -> None:
     """It is foreseen, told with its place and time, and reached in some hundred evaluations."""
     motion = FreeMotion.of(prepare(rocker(friction)))
-    integration = Integration(motion, Walks(motion), 2.0, 1e-9)
+    integration = ActiveMotion(motion, Walks(motion), 2.0, 1e-9)
     found = integration.run(initial_row(motion))
     assert found.ended is not None
     assert found.ended.code == "simulate.dead_centre"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from trunnion.algebra.space import ORIGIN
-from trunnion.dynamics.active import Mode, Modes, settled
+from trunnion.dynamics.active import RowMode, RowModes, settled
 from trunnion.dynamics.bordered import least_shares
 from trunnion.dynamics.impact_motion import OPEN, STICK, strike
 from trunnion.joints.contact_loads import BearingLoad, GuideLoad, PinLoad
@@ -195,14 +195,14 @@ def test_the_worst_row_first_finds_what_all_cases_have(seed: int, count: int) ->
     root, begin = random.normal(size=(count, count)), random.normal(size=count)
     matrix = root @ root.T + 0.1 * np.eye(count) + 0.5 * (root - root.T)
 
-    def missed(modes: Modes) -> dict[int, float]:
+    def missed(modes: RowModes) -> dict[int, float]:
         held = [k for k, mode in enumerate(modes) if mode == 0]
         force = np.zeros(count)
         force[held] = np.linalg.solve(matrix[np.ix_(held, held)], -begin[held])
         gap = matrix @ force + begin
         return {k: min(0.0, force[k] if k in held else gap[k]) for k in range(count)}
 
-    def objections(modes: Modes) -> Mapping[int, Mode]:
+    def objections(modes: RowModes) -> Mapping[int, RowMode]:
         rows = missed(modes)
         worst = min(rows, key=lambda k: rows[k])
         return {worst: None if modes[worst] == 0 else 0} if rows[worst] < -1e-12 else {}
@@ -212,7 +212,7 @@ def test_the_worst_row_first_finds_what_all_cases_have(seed: int, count: int) ->
 
 
 def test_where_changes_come_round_all_cases_are_tried() -> None:
-    def objections(modes: Modes) -> Mapping[int, Mode]:
+    def objections(modes: RowModes) -> Mapping[int, RowMode]:
         return {} if modes == (0, None) else {k: None if mode == 0 else 0 for k, mode in enumerate(modes)}
 
     assert settled([None, None], objections, [(None, 0)] * 2) == (0, None)

@@ -81,7 +81,7 @@ def test_a_slider_jams_where_its_push_turns_round_and_the_block_on_it_keeps_its_
     assert (low + high)[known] == pytest.approx(0.0, abs=1e-9)
     assert float(abs(data.energy_residual).max()) < 1e-9
     assert float(data.work_friction[-1]) > float(lock[3] or 0.0)
-    assert findings(data)["simulate.joints_lock"]["joints"] == ["A"]
+    assert findings(data)["simulate.locks"]["joints"] == ["A"]
     assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
 
 
@@ -192,7 +192,7 @@ def test_several_accelerations_are_told(torque: float, rough: float, known: int)
     assert solutions(torque, rough) == known
     found = findings(simulate(rod(torque, rough=rough), 1e-4, 1))
     assert ("simulate.several_accelerations" in found) == (known > 1)
-    assert "simulate.joints_lock" not in found
+    assert "simulate.locks" not in found
 
 
 # ---- rest -----------------------------------------------------------------------------------------------------
@@ -221,19 +221,19 @@ def test_all_free_drivers_come_to_rest() -> None:
     assert [(kind, of) for kind, of, *_ in events(data)] == [("stick", "W"), ("stick", "A"), ("rest", "A")]
     assert events(data)[-1][2] == pytest.approx(done, abs=1e-8)
     assert data.resting.values.tolist() == [int(time > done) for time in data.time.values]
-    told = findings(data)["simulate.all_stall"]
+    told = findings(data)["simulate.stalls"]
     assert (told["joint"], told["drivers"]) == ("A", ["A"])
     assert told["share"] == pytest.approx(0.45 / 0.6, rel=1e-9)
     ways = {one.name: one.value for one in summary_of(data) if one.name.endswith(("run_down", "run_down_way"))}
     assert ways["W.run_down"] == pytest.approx(done, abs=1e-8)
     assert ways["W.run_down_way"] == pytest.approx(0.5 * 3.0 * 3.0 * 0.05 / 0.6, rel=1e-8)
     switched = simulate(wheels({"kind": "constant", "effort": 0.45, "off_from": 1.5}), 3.0, 3)
-    assert "simulate.all_rest" in findings(switched)
+    assert "simulate.rests" in findings(switched)
 
 
 def test_nothing_starts() -> None:
     data = simulate(wheels({"kind": "constant", "effort": 0.45}, speed=0.0), 1.0, 4)
-    assert findings(data)["simulate.none_starts"]["share"] == pytest.approx(0.75)
+    assert findings(data)["simulate.stays_at_rest"]["share"] == pytest.approx(0.75)
     assert data.resting.values.all()
     assert not data.drive_rate.values.any()
 

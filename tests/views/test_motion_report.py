@@ -23,7 +23,7 @@ from playing import rattling
 from playing_space import rattling_in_space
 from timed import slider_crank, three_posts, wheel
 from trunnion import analyse, simulate
-from trunnion.dynamics.filling import spectrum
+from trunnion.dynamics.result import spectrum
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.tables import columns

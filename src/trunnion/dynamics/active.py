@@ -24,11 +24,11 @@ from trunnion.dynamics.rates import kinetic_energy
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
-__all__ = ["ActiveSet", "Case", "Lock", "Mode", "Modes", "Senses", "settled"]
+__all__ = ["ActiveSet", "Case", "Lock", "RowMode", "RowModes", "Senses", "settled"]
 
 Array = NDArray[np.float64]
-Mode = int | None  # of a row: 0 it holds, +1 or −1 it slips in that sense, None it is open
-Modes = tuple[Mode, ...]
+RowMode = int | None  # of a row: 0 it holds, +1 or −1 it slips in that sense, None it is open
+RowModes = tuple[RowMode, ...]
 Senses = tuple[int, ...]
 
 MEET = 1e-8  # of a typical speed: joints that are as slow may stick
@@ -42,15 +42,17 @@ INSTANT = 1e-12  # of a typical time: in which a joint locks
 
 
 def settled(
-    start: Sequence[Mode], objections: Callable[[Modes], Mapping[int, Mode] | None], choices: Sequence[Modes]
-) -> Modes | None:
+    start: Sequence[RowMode],
+    objections: Callable[[RowModes], Mapping[int, RowMode] | None],
+    choices: Sequence[RowModes],
+) -> RowModes | None:
     """Modes to which no row objects: from a start rows change as they object; where that comes round, all cases are
     tried. None: there are none.
 
     objections: rows that do not do what a case says, the worst of them, with what they seem to do instead; None: the
     case has no answer. choices: of every row.
     """
-    modes, tried = tuple(start), set[Modes]()
+    modes, tried = tuple(start), set[RowModes]()
     while modes not in tried:
         tried.add(modes)
         changes = objections(modes)
@@ -113,9 +115,9 @@ class ActiveSet:
         """The moment with the senses of all joints and the contacts that agree with forces and accelerations; None: no
         case does. From all sticking that may, those are let go that cannot, and taken back that would turn round."""
         contacts = {k: onset.sense for k, onset in enumerate(at.onsets) if isinstance(onset, Closed)}
-        start: list[Mode] = [*(base[k] for k in may), *contacts.values()]
+        start: list[RowMode] = [*(base[k] for k in may), *contacts.values()]
 
-        def moment(modes: Sequence[Mode]) -> Moment:
+        def moment(modes: Sequence[RowMode]) -> Moment:
             senses, onsets = list(base), list(at.onsets)
             for k, mode in zip(may, modes, strict=False):
                 senses[k] = mode or 0
@@ -123,10 +125,10 @@ class ActiveSet:
                 onsets[k] = None if mode is None else Closed(mode)
             return at._replace(senses=tuple(senses), onsets=tuple(onsets))
 
-        def objections(modes: Modes) -> Mapping[int, Mode] | None:
+        def objections(modes: RowModes) -> Mapping[int, RowMode] | None:
             return self._objections(moment(modes), may, contacts, brink and list(modes) == start)
 
-        choices: list[Modes] = [(0, 1, -1)] * len(may)
+        choices: list[RowModes] = [(0, 1, -1)] * len(may)
         for k, sense in contacts.items():
             sticky = self.motion.contacts.each[k].coefficient > 0.0
             choices.append((sense or 1, None) if sense or not sticky else (0, 1, -1, None))
@@ -135,7 +137,7 @@ class ActiveSet:
 
     def _objections(
         self, at: Moment, may: Sequence[int], contacts: Mapping[int, int], brink: bool
-    ) -> Mapping[int, Mode] | None:
+    ) -> Mapping[int, RowMode] | None:
         """See `settled`: joints that may stick, then contacts that were closed. brink: whether those joints break away
         that are at the end of their share."""
         if not self._alike(at):
@@ -169,11 +171,11 @@ class ActiveSet:
 
     def _of_contacts(
         self, at: Moment, answer: Accelerated, contacts: Mapping[int, int], small: float
-    ) -> dict[int, Mode]:
+    ) -> dict[int, RowMode]:
         """The worst of the contacts that pull, sink in, or slip or stick against their friction, with those on its
         wall, and what they seem to do instead. contacts: those that were closed, with their senses."""
         pull = self.motion.size * small * self.motion.pace**2
-        force, worst = TINY * self.motion.force, list[tuple[float, int, Mode]]()
+        force, worst = TINY * self.motion.force, list[tuple[float, int, RowMode]]()
         for k, before in contacts.items():
             contact, onset = self.motion.contacts.each[k], answer.onsets[k]
             gap, slip = (single(part) for part in contact.accelerations(answer.back.walk))

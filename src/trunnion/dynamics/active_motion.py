@@ -18,29 +18,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from trunnion.dynamics.active import IDLE, SLACK, ActiveSet
 from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seen
-from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
+from trunnion.dynamics.solution import Event, Impact, Solution, Stretch, over_steps, step_nodes
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset
-from trunnion.joints.contact import elastic_force
 
-__all__ = ["ActiveMotion", "OpenContact", "step_nodes"]
+__all__ = ["ActiveMotion", "OpenContact"]
 
 Array = NDArray[np.float64]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
-CLOSELY = 33  # times about a largest force
-GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
+GAP, SLIP, NORMAL = range(3)  # rows of a contact over a step
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
 ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
 
@@ -55,8 +51,6 @@ class OpenContact:
     depth: float = 0.0
     wear: float = 0.0
     impulse: float = 0.0
-    separation: float = 0.0
-    loss: float = 0.0
 
 
 @dataclass
@@ -185,7 +179,7 @@ class ActiveMotion(Integration):
 
     def _impact_of(self, k: int, contact: OpenContact, end: float, rate: float) -> Impact:
         label, figures = self.motion.contacts.labels[k], (contact.force, contact.depth, contact.wear, contact.impulse)
-        return Impact(label, contact.begin, end, contact.approach, rate, *figures, contact.loss)
+        return Impact(label, contact.begin, end, contact.approach, rate, *figures)
 
     # ---- what holds, slips and is open ------------------------------------------------------------------------
 
@@ -301,41 +295,23 @@ class ActiveMotion(Integration):
     # ---- what a contact comes to ------------------------------------------------------------------------------
 
     def _measured(self, stretch: Stretch) -> None:
-        """Peaks, impulse, wear and loss of the contacts that last, of a step: by Gauss and Legendre's rule on its dense
-        output, between places where a slip turns round."""
-        if not self._open:
+        """Peaks, impulse and wear of the contacts that last, of a step."""
+        if not (self._open and stretch.end > stretch.begin):
             return
-        dense, begin, end = stretch.state, stretch.begin, stretch.end
-        times, weights = step_nodes(begin, end)
-        touches = self._look(dense, times)
+        begins = np.array([stretch.begin, stretch.end])
+        touches = self._look(stretch.state, step_nodes(begins)[0])
         for k, opening in self._open.items():
-            contact = self.motion.contacts.each[k]
-            normal, slip = touches.normal[k], touches.slip[k]
-            elastic = elastic_force(-touches.gap[k], contact.stiffness, contact.exponent)
-            opening.impulse += float(weights @ normal)
-            opening.loss += float(weights @ ((elastic - normal) * touches.rate[k]))
-
-            def slip_at(time: float, k: int = k) -> float:
-                return float(self._look(dense, np.array([time])).slip[k, 0])
-
-            turns = [float(brentq(slip_at, *times[i : i + 2])) for i in np.flatnonzero(slip[1:] * slip[:-1] < 0.0)]
-            for low, high in pairwise([begin, *turns, end]) if turns else ():
-                parts, shares = step_nodes(low, high)
-                part = self._look(dense, parts)
-                opening.wear += float(shares @ np.abs(part.normal[k] * part.slip[k]))
-            opening.wear += 0.0 if turns else float(weights @ np.abs(normal * slip))
-            opening.force = self._largest(dense, times, touches.normal[k], k, 1, opening.force)
-            opening.depth = self._largest(dense, times, -touches.gap[k], k, -1, opening.depth)
-
-    def _largest(self, dense: Dense, times: Array, touches: Array, k: int, what: int, peak: float) -> float:
-        """The largest normal force (what: 1) or penetration (−1) of a contact, from before and within a step: looked at
-        closely where it may be the largest."""
-        top = int(np.argmax(touches))
-        if touches[top] > (1.0 - NEARLY) * peak:
-            low, high = times[max(top - 1, 0)], times[min(top + 1, len(times) - 1)]
-            close = self._look(dense, np.linspace(low, high, CLOSELY))
-            peak = max(peak, _peak(close.normal[k] if what > 0 else -close.gap[k]))
-        return peak
+            numbers = np.array([touches.gap[k], touches.slip[k], touches.normal[k]])
+            courses = over_steps(begins, numbers[:, None])
+            parted = courses.parted(courses.passages(SLIP))
+            opening.impulse += courses.span * float(courses.mean()[NORMAL])
+            opening.wear += courses.span * float(parted.mean(lambda rows: np.abs(rows[SLIP] * rows[NORMAL])))
+            if np.max(numbers[NORMAL]) > (1.0 - NEARLY) * opening.force and (place := courses.extreme(_normal)):
+                opening.force = max(opening.force, place.value)
+            if self.motion.contacts.each[k].rigid:
+                continue
+            if np.max(-numbers[GAP]) > (1.0 - NEARLY) * opening.depth and (place := courses.extreme(_depth)):
+                opening.depth = max(opening.depth, place.value)
 
     def run(self, row: Array) -> Solution:
         """The motion from an initial row; contacts that last at its end have an end that is not known."""
@@ -345,17 +321,9 @@ class ActiveMotion(Integration):
         return self.solution
 
 
-def step_nodes(begin: float, end: float) -> tuple[Array, Array]:
-    """Times of a step, its ends and the nodes of Gauss and Legendre's rule, s, and their weights, 0 at the ends."""
-    nodes, weights = 0.5 * (end - begin) * GAUSS
-    return np.concatenate([[begin], 0.5 * (begin + end) + nodes, [end]]), np.concatenate([[0.0], weights, [0.0]])
+def _normal(rows: Array) -> Array:
+    return np.asarray(rows[NORMAL])
 
 
-def _peak(values: Array) -> float:
-    """The largest of equally spaced numbers, of the parabola through it and its neighbours."""
-    k = int(np.argmax(values))
-    if not 0 < k < len(values) - 1:
-        return float(values[k])
-    before, top, after = (float(value) for value in values[k - 1 : k + 2])
-    bend = before - 2.0 * top + after
-    return top if bend >= 0.0 else top - 0.125 * (after - before) ** 2 / bend
+def _depth(rows: Array) -> Array:
+    return np.asarray(-rows[GAP])

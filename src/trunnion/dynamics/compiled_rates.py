@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
-from trunnion.dynamics.rates import Layout, Rates, Seen, Walks, beside
+from trunnion.dynamics.rates import Dynamics, Layout, Rates, Seen, Walks, beside, bridged
 from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
@@ -43,9 +43,9 @@ TRIAL = "trial."  # in the path of an acceleration, see `FreeMotion.trial`
 Codes = dict[tuple[Any, ...], "Code | None"]
 
 
-def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> CompiledRates | Walks:
+def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> Dynamics:
     """The rates of a motion: by machine code where they may be, else by walks. codes, varied: see `CompiledRates`."""
-    return CompiledRates(motion, codes, varied) if compilable(motion) else Walks(motion)
+    return bridged(motion, CompiledRates(motion, codes, varied) if compilable(motion) else Walks(motion))
 
 
 def compilable(motion: FreeMotion) -> bool:

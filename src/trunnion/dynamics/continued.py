@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import single
-from trunnion.dynamics.checks import check_start, refuse, refuse_undetermined
-from trunnion.dynamics.compiled_rates import Codes, CompiledRates, rates_of
-from trunnion.dynamics.filling import Books, filled
-from trunnion.dynamics.findings import motion_findings
+from trunnion.dynamics.compiled_rates import Codes, rates_of
+from trunnion.dynamics.findings import check_start, motion_findings, refuse, refuse_undetermined
 from trunnion.dynamics.followed import Snapshot
+from trunnion.dynamics.impact_motion import integration_of
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play
-from trunnion.dynamics.prepared import integration_of
-from trunnion.dynamics.rates import Walks
+from trunnion.dynamics.rates import Dynamics, Walks
+from trunnion.dynamics.result import Books, filled
 from trunnion.dynamics.solution import CLOSE, Solution
 from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.state import FreeMotion, Mode
@@ -77,7 +76,7 @@ class Continued:
         self._places, self._row, self._mode = places(self.motion), initial_row(self.motion), Mode()
         check_start(self.motion, self._row, self._places.limits)
         self._snapshot: Snapshot | None = None
-        self._rates: CompiledRates | Walks = Walks(self.motion)
+        self._rates: Dynamics = Walks(self.motion)
         self._end: Books | None = None
 
     def now(self) -> Books:

@@ -1,28 +1,186 @@
-"""What is to be known of a motion in time: how it rests, locks or ends, and what of it is doubtful."""
+"""What motion in time cannot do for a mechanism, and what is to be known of a motion: how it rests, locks or ends."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import single
 from trunnion.cycle.findings import effort_units
-from trunnion.dynamics.solution import Ended, Solution
+from trunnion.dynamics.opened import in_play, of_several
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.solution import Ended, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.touching import SLOWEST
-from trunnion.errors import Finding, Status, agreeing, counted
+from trunnion.errors import Finding, MechanismError, Status, agreeing, counted
 from trunnion.joints.contact import restitution_of
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.solve.run import Run
+from trunnion.solve.track import TOUCHING
 
-__all__ = ["motion_findings", "stated_drivers", "undefined"]
+__all__ = [
+    "check_start", "motion_findings", "refuse", "refuse_massless", "refuse_undetermined", "stated_drivers", "undefined",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
-DIFFERS = 0.01  # of a restitution, of a loss: a difference that is worth a note
-FEW = 2  # contacts that begin slowly, of which nothing is said
+SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none
+BESIDE, MASSLESS = 0.1, 1e-15  # rad, or of the size: how far from the start more inertia may be; a share that is none
+SMOOTH = [name for name, law in FRICTION_LAWS.items() if not law.interval_at_rest]
+DIFFERS = 0.01  # of a restitution: a difference that is worth a note
+
+
+# ---- before it begins -------------------------------------------------------------------------------------------
+
+
+def refuse(mechanism: Mechanism) -> None:
+    """MechanismError with what keeps a mechanism from being let move."""
+    if findings := list(_refused(mechanism)):
+        raise MechanismError(findings)
+
+
+def refuse_undetermined(run: Run, playing: Sequence[str] = ()) -> None:
+    """MechanismError where the joints of a mechanism in space do not determine its motion or its reactions. playing:
+    joints in play, without which it is."""
+    determinacy = run.determinacy
+    redundant = [joint for part in determinacy.parts if part.redundant for joint in part.joints] if determinacy else []
+    if redundant and playing:
+        what = f"{', '.join(redundant)} constrain each other more than once also while {', '.join(playing)} is in play"
+        raise MechanismError(Finding(what, "joints", "use a joint with more freedoms there (cylindrical, spherical)"))
+    if determinacy is not None:
+        determinacy.refuse()
+
+
+def refuse_massless(motion: FreeMotion, row: Array) -> None:
+    """MechanismError where a force on some free coordinate would accelerate nothing: links without mass that no joint
+    holds. row: the state at the start."""
+    contacts, values = motion.contacts.each, motion.values
+    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(contacts))
+    matrix = motion.inertia(at)[:, :, 0] * motion.unit
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    with np.errstate(all="ignore"):
+        if np.all(scale > 0) and np.linalg.cond(matrix / scale[:, None] / scale) < SINGULAR:
+            return
+    keys = ["mass", *(f"inertia{axis}" for axis in ([".xx", ".yy", ".zz"] if motion.system.spatial else [""]))]
+    links = dict.fromkeys(link for contact in contacts for link in (contact.body, contact.other))
+    links.pop(motion.system.mechanism.fixed_link, None)
+    light = [link for link in links if not all(np.any(values.get(f"links.{link}.{key}", 0.0)) for key in keys)]
+    what = f"{', '.join(light or links)} has no mass, or no inertia about some axis, where nothing holds it while the "
+    what += f"pins of {', '.join(dict.fromkeys(contact.joint for contact in contacts))} are in play"
+    remedy = "state its mass and inertia, or let fewer of its joints be in play"
+    raise MechanismError(Finding(what, f"links.{(light or list(links))[0]}", remedy))
+
+
+def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
+    """MechanismError for a start outside a range, at a change point, or where nothing moves that has a mass."""
+
+    def refused(name: str, what: str) -> MechanismError:
+        return MechanismError(Finding(f"begins {what}", f"drivers.{name}.initial", "begin elsewhere"))
+
+    for name, (low, high) in limits.items():
+        place = row[motion.names.index(name)]
+        if not low <= place <= high:
+            raise refused(name, f"at {place:g} (SI), outside its range from {low:g} to {high:g}")
+    layout, first = Layout.of(motion), motion.names[0]
+    at = layout.moment(np.zeros(1), row[:, None])
+    for module, margin in zip(motion.meeting, motion.margins(motion.walk(at, np.zeros_like(at.q))), strict=True):
+        if single(margin) < TOUCHING:
+            links = ", ".join(motion.system.plan.modules[module].links)
+            raise refused(first, f"at a change point: two assembly modes of the links {links} coincide there")
+    rows = np.repeat(row[:, None], 2, axis=1)
+    rows[0, 1] += BESIDE * (1.0 if motion.system.turns(first) else motion.size)
+    inertia, nearby = np.abs(motion.inertia(layout.moment(np.zeros(2), rows))[0, 0])
+    if not motion.several and inertia < MASSLESS * nearby:
+        raise refused(first, "where nothing moves that has a mass, as at a dead centre: it has no acceleration there")
+
+
+def _refused(mechanism: Mechanism) -> Iterator[Finding]:
+    free, playing = [name for name, driver in mechanism.drivers.items() if driver.found], in_play(mechanism)
+    first = next(iter([*free, *mechanism.drivers]), "")
+    where = f"drivers.{first}" if first else "drivers"
+    if not free and not playing:
+        what = "no driver is free, so there is no motion to find"
+        yield Finding(what, where, "state a motor, such as motor: {kind: constant, effort: 4 N m}, or free: true")
+        return
+    ground = f"links.{mechanism.fixed_link}."
+    inert = [
+        value
+        for path, value in mechanism.parameters().items()
+        if path.startswith(("links.", "drivers.")) and not path.startswith(ground)
+        and (".mass" in path or ".inertia" in path)
+    ]  # fmt: skip
+    if not np.any([np.any(value != 0) for value in inert]):
+        remedy = "state a mass or an inertia of a link that it moves, or the inertia of its motor"
+        yield Finding("no mass moves with it, so it has no acceleration", where, remedy)
+    yield from _in_play(mechanism, playing)
+    if len(free) < 2 and not playing:
+        return
+    values, joints = mechanism.parameter_set.nominal, mechanism.effective_joints
+    rough = next((name for name in playing if (contact := joints[name].contact) is not None and contact.of.rigid
+                  and values.get(f"joints.{name}.friction.coefficient", 0.0) != 0.0), "")  # fmt: skip
+    for where, joint in _resisting(mechanism, free):
+        what = ""
+        if where.endswith(".clutch"):
+            what = "a clutch that may slip is solved with one free coordinate, and without joints in play"
+        elif joint in playing:
+            what = f"it may hold joint {joint}, which is in play"
+        elif rough:
+            what = f"it may hold joint {joint} beside friction between rigid bodies in {rough}; how they share is not "
+            what += "solved"
+        elif PAIRS[joints[joint].type].count != 1:
+            what = f"it may hold joint {joint}, which has more than one freedom, and {len(free)} coordinates are free"
+        if what:
+            yield Finding(what, where, f"leave it out, or use a law that is smooth at rest: {', '.join(SMOOTH)}")
+
+
+def _in_play(mechanism: Mechanism, playing: Sequence[str]) -> Iterator[Finding]:
+    """What joints in play cannot have, nor those of their loops that chains of single turns and slides stand for."""
+    joints, values = mechanism.effective_joints, mechanism.parameters()
+    rigid = {name: contact.of.rigid for name in playing if (contact := joints[name].contact) is not None}
+    if len(set(rigid.values())) > 1:
+        other = next(name for name, is_rigid in rigid.items() if not is_rigid)
+        what = "it is in play beside joints in play between rigid bodies"
+        yield Finding(what, f"joints.{other}.contact.law", "use law: rigid for all joints in play, or for none")
+    for name in playing:
+        friction = joints[name].friction
+        plain = ["coulomb"] if rigid[name] else [law for law in SMOOTH if FRICTION_LAWS[law].relaxation is None]
+        if friction and friction.law and friction.law not in plain:
+            what = f"the law {friction.law} is not one of a contact that comes and goes"
+            yield Finding(what, f"joints.{name}.friction", f"use {' or '.join(plain)}")
+    for name in of_several(mechanism):
+        path, friction = f"joints.{name}", joints[name].friction
+        rubs = any(values[f"{path}.friction.{key}"] != 0 for key in (friction.parameters if friction else ()))
+        losing = joints[name].losses is not None
+        springs = [f"springs.{spring}" for spring, entry in mechanism.springs.items() if entry.joint == name]
+        for where in [*([f"{path}.friction"] * rubs), *([f"{path}.losses"] * losing), *springs]:
+            what = f"it is not modelled in a {joints[name].type} joint of a loop with {', '.join(playing)} in play"
+            yield Finding(what, where, "leave it out: 0 for friction, a spring between two points")
+
+
+def _resisting(mechanism: Mechanism, free: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """What may slip, or hold a joint at rest: its path, and the joint."""
+    for name in free:
+        if (motor := mechanism.drivers[name].motor) is not None:
+            losing = motor.efficiency is not None and motor.efficiency.source != 1
+            parts = {"clutch": motor.clutch is not None, "efficiency": losing, "brake": motor.brake is not None}
+            yield from ((f"drivers.{name}.motor.{key}", name) for key, resists in parts.items() if resists)
+    for name, joint in mechanism.effective_joints.items():
+        law = joint.friction.law if joint.friction else None
+        if law and joint.contact is None and FRICTION_LAWS[law].interval_at_rest:
+            yield f"joints.{name}.friction", name
+        if joint.losses is not None and joint.losses.constant is not None:
+            yield f"joints.{name}.losses.constant", name
+    for name, load in mechanism.loads.items():
+        if load.joint is not None:
+            yield f"loads.{name}", load.joint
+
+
+# ---- of a motion ------------------------------------------------------------------------------------------------
 
 
 def stated_drivers(motion: FreeMotion, run: Run) -> list[str]:
@@ -52,9 +210,19 @@ def motion_findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterato
         what = f"change points are passed {counted(len(passed), 'time')}, first at {readable(passed[0], 's')}, with "
         what += "the velocities that the links have: reactions have no bound there, so that no largest ones are told"
         yield Finding.warning("simulate.passed", "assembly", what, times=len(passed), time=passed[0])
-    yield from _locks(motion, solution)
+    if locks := [event for event in solution.events if event.kind == "lock"]:
+        joints, times = list(dict.fromkeys(event.of for event in locks)), len({event.time for event in locks})
+        energy = float(np.nansum([event.figure for event in locks]))
+        what = f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
+        what += f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
+        what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, and {readable(energy, 'J')} is lost"
+        remedy = "see `trunnion locking` for where and by how much"
+        figures = {"joints": joints, "times": times, "time": locks[0].time, "energy": energy}
+        where = f"{'joints' if motion.several else 'drivers'}.{joints[0]}"
+        yield Finding.warning("simulate.locks", where, what, remedy, **figures)
     name = next(iter(stated_drivers(motion, run)), next(iter(motion.system.mechanism.drivers)))
-    yield from _rests(motion, solution, name)
+    if solution.stretches and solution.stretches[-1].resting:
+        yield from _rests(motion, solution, name)
     if solution.ended is not None:
         driver = solution.ended.figures.get("driver", name)
         yield _end(solution.ended, driver, "rad" if motion.system.turns(driver) else "m")
@@ -78,11 +246,11 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
     place = f"coordinate {own['coordinate']:.6g}" if "coordinate" in own else ""
     state = f"{place}, rate {own['rate']:.6g}" if "rate" in own else place
     where, figures = f"drivers.{driver}", {**own, "driver": driver, "unit": unit, "time": ended.time}
-    remedy = "check the forces there: one of them has no value, jumps, or grows without bound"
+    forces = "check the forces there: one of them has no value, jumps, or grows without bound"
+    dead = "limit the motion by a stop or a load, or drive a joint that has no dead centre there"
     match ended.code.removeprefix("simulate."):
         case "range":
-            what = f"{driver} reaches {readable(own['coordinate'], unit)}, the end of its stated range, at {at}: the "
-            what += "motion ends there"
+            what = f"{driver} reaches {readable(own['coordinate'], unit)}, the end of its stated range, at {at}"
             remedy = f"widen drivers.{driver}.range, or stop the motion before by a load or a brake"
             return Finding.warning("simulate.range", where, what, remedy, **figures)
         case "no_acceleration":
@@ -93,139 +261,93 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
             return Finding.error("simulate.no_acceleration", where, what, remedy, **figures)
         case "unsolved":
             what = f"the accelerations are not found at {at} ({state})"
-            return Finding.error("simulate.unsolved", where, what, remedy, **figures)
+            return Finding.error("simulate.unsolved", where, what, forces, **figures)
         case "step":
             what = f"the integration needs steps below rounding at {at} ({state})"
-            return Finding.error("simulate.step", where, what, remedy, **figures)
+            return Finding.error("simulate.step", where, what, forces, **figures)
         case "dead_centre":
             what = f"{driver} reaches its dead centre, {own['coordinate']:.6g} {unit}, at {at}: the links cannot be "
-            what += f"assembled beyond it, and go on as {driver} reverses; the motion ends there"
-            remedy = "drive a joint that has no dead centre there, or limit the motion by a stop or a load"
-            return Finding.error("simulate.dead_centre", where, what, remedy, **figures)
+            what += f"assembled beyond it, and go on as {driver} reverses"
+            return Finding.error("simulate.dead_centre", where, what, dead, **figures)
         case "not_assembled":
-            what = f"the links cannot be assembled beyond {at} ({place}): the motion ends there"
-            remedy = "limit the motion by a stop or a load, or drive a joint that has no dead centre there"
-            return Finding.error("simulate.not_assembled", where, what, remedy, **figures)
+            what = f"the links cannot be assembled beyond {at} ({place})"
+            return Finding.error("simulate.not_assembled", where, what, dead, **figures)
         case "events":
             what = f"there are {own['count']:.0f} events up to {at}: the motion is not followed farther"
-            remedy = "ask for a shorter time"
-            return Finding.error("simulate.events", where, what, remedy, **figures)
+            return Finding.error("simulate.events", where, what, **figures)
         case "change_point":
             what = f"at {at}, at {readable(own['coordinate'], unit)} of {driver}, the links {', '.join(own['links'])} "
             what += "come to a change point, where two of their assembly modes coincide: neither reactions nor what "
-            what += "follows are determined, and the motion ends there"
+            what += "follows are determined"
             remedy = f"change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake"
             return Finding.error("simulate.change_point", where, what, remedy, **figures)
         case "evaluations":
-            what = f"{own['count']:,} evaluations of the forces are used up at {at} of {readable(own['of'], 's')}: the "
-            what += "motion ends there"
+            what = f"{own['count']:,} evaluations of the forces are used up at {at} of {readable(own['of'], 's')}"
             remedy = "look for a stiff spring, damper or contact on a small mass; ask for a shorter --time or more "
             remedy += "--evaluations"
             return Finding.error("simulate.evaluations", where, what, remedy, **figures)
         case _:
             what = f"there are no forces or impulses of the contacts that touch at {at} ({state}) under which nothing "
-            what += "sinks in (Painlevé's paradox): the motion is kept until then"
+            what += "sinks in (Painlevé's paradox)"
             remedy = "lower the friction of the joints in play, or state a stiffness instead of law: rigid"
             return Finding.error("simulate.no_contact_force", where, what, remedy, **figures)
 
 
-def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
-    """What locks as it runs."""
-    locks = [event for event in solution.events if event.kind == "lock"]
-    if not locks:
-        return
-    joints, times = list(dict.fromkeys(event.of for event in locks)), len({event.time for event in locks})
-    energy = float(np.nansum([event.figure for event in locks]))
-    what = f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
-    what += f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
-    what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, and {readable(energy, 'J')} is lost"
-    remedy = "see `trunnion locking` for where and by how much"
-    figures = {"joints": joints, "times": times, "time": locks[0].time, "energy": energy}
-    if motion.several:
-        yield Finding.warning("simulate.joints_lock", f"joints.{joints[0]}", what, remedy, **figures)
-    else:
-        yield Finding.warning("simulate.locks", f"drivers.{joints[0]}", what, remedy, **figures)
-
-
 def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Finding]:
     """What holds it where it rests at the end."""
-    rests = [event.time for event in solution.events if event.kind == "rest"]
-    if not (rests and solution.stretches and solution.stretches[-1].resting):
-        return
-    last = solution.stretches[-1]
+    last, rests = solution.stretches[-1], [event.time for event in solution.events if event.kind == "rest"]
     at = last.at(solution.layout, np.array([last.begin]))
+    turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
+    figures: dict[str, Any]
     if motion.several:
         shares = np.abs(np.asarray(motion.accelerate(at).shares)[:, 0])
         joint, share = motion.resisted[int(np.argmax(shares))], float(np.max(shares))
-        where, subject = f"joints.{joint}", "every free driver"
+        where, subject, at_place = f"joints.{joint}", "every free driver", ""
         acts = f"what acts needs {share:.2%} of what resists it at rest in {joint}, and no more in the other joints"
-        figures: dict[str, Any] = {"joint": joint, "share": share}
+        figures = {"joint": joint, "share": share}
     else:
         effort = effort_units(motion.system)[list(motion.system.mechanism.drivers).index(name)]
         acting, (forward, backward) = float(motion.given(at, 0.0 * at.q, {})[0, 0]), motion.excess(at)[:, 0]
         needed = acting - forward if acting > 0 or (acting == 0 and forward >= backward) else acting + backward
-        where, subject = f"drivers.{name}", name
+        place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
+        where, subject, at_place = f"drivers.{name}", name, f", at {readable(place, unit)}"
         acts = f"{readable(acting, effort)} act on it, and it breaks away from {readable(needed, effort)} on"
         figures = {"driver": name, "given": acting, "needed": needed, "unit": effort}
     since = readable(rests[-1], "s")
     if all(stretch.resting for stretch in solution.stretches):
         remedy = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
-        what = f"{subject} does not start: {acts}"
-        if motion.several:
-            yield Finding.warning("simulate.none_starts", where, what, remedy, **figures)
-        else:
-            yield Finding.warning("simulate.stays_at_rest", where, what, remedy, **figures)
-    elif on := _on(motion, solution):
-        turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
-        place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
-        at_place, of = (f", at {readable(place, unit)}", "") if not motion.several else ("", f" of {', '.join(on)}")
-        what = f"{subject} stalls at {since}{at_place}, with the motor{of} on: {acts}"
+        yield Finding.warning("simulate.stays_at_rest", where, f"{subject} does not start: {acts}", remedy, **figures)
+    elif on := _on(motion, solution, last):
+        figures |= {"time": rests[-1], "drivers": on} if motion.several else {
+            "time": rests[-1], "coordinate": place, "place": "rad" if turns else "m"
+        }  # fmt: skip
+        what = f"{subject} stalls at {since}{at_place}, with the motor of {', '.join(on)} on: {acts}"
         remedy = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
-        figures["time"] = rests[-1]
-        if motion.several:
-            yield Finding.error("simulate.all_stall", where, what, remedy, **figures, drivers=on)
-        else:
-            yield Finding.error("simulate.stalls", where, what, remedy, **figures, coordinate=place, place=unit)
+        yield Finding.error("simulate.stalls", where, what, remedy, **figures)
     else:
         what = f"{subject} comes to rest {counted(len(rests), 'time')}, for the last time at {since}: {acts}"
-        figures |= {"time": rests[-1], "times": len(rests)}
-        if motion.several:
-            yield Finding.note("simulate.all_rest", where, what, **figures)
-        else:
-            yield Finding.note("simulate.rests", where, what, **figures)
+        yield Finding.note("simulate.rests", where, what, **figures, time=rests[-1], times=len(rests))
 
 
-def _on(motion: FreeMotion, solution: Solution) -> list[str]:
-    """The free drivers whose motor still acts at the end, through its clutch if it has one, and is not braked."""
-    last, time = solution.stretches[-1], np.array([solution.end])
-    at = solution.layout.moment(time, solution.at(time)[0], last.mode)
+def _on(motion: FreeMotion, solution: Solution, last: Stretch) -> list[str]:
+    """Drivers whose motor gives an effort at the end of a motion, without a brake."""
+    at = last.at(solution.layout, np.array([solution.end]))
     return [
         name
         for i, (name, drive) in enumerate(motion.drives.items())
         if not drive.braking(at.now)
-        and np.any(drive.seen(at.now, at.slips).shaft(time, at.rate[i], at.integral[i], at.now) != 0.0)
+        and np.any(drive.seen(at.now, at.slips).shaft(at.time, at.rate[i], at.integral[i], at.now) != 0.0)
     ]
 
 
 def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:
-    """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in; what is
-    lost in contacts that begin so slowly that their law is not followed."""
+    """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in."""
     for contact in motion.contacts.each:
-        where = f"joints.{contact.joint}.contact"
-        of_contact = [impact for impact in solution.impacts if impact.label == contact.label]
-        slow = [impact for impact in of_contact if impact.approach < SLOWEST]
-        lost, total = (sum(impact.loss for impact in group) for group in (slow, of_contact))
-        if len(slow) > FEW and lost > DIFFERS * total:
-            what = f"{contact.label}: {len(slow)} of {len(of_contact)} contacts begin slower than "
-            what += f"{readable(SLOWEST, 'm/s')} and are treated as beginning at that speed; {lost / total:.2%} of "
-            what += "what the contact law loses is lost in them"
-            remedy = "compare with another restitution: the law is one of impacts, and tells little of slow pressing"
-            yield Finding.note("simulate.slow_onsets", where, what, remedy, count=len(slow), share=lost / total)
-        depth = max((impact.depth for impact in of_contact), default=0.0)
+        depth = max((impact.depth for impact in solution.impacts if impact.label == contact.label), default=0.0)
         if depth > contact.clearance:
             what = f"{contact.label}: the surfaces sink {readable(depth, 'm')} into each other, more than the "
-            what += f"clearance of {readable(contact.clearance, 'm')}"
-            remedy = "check the stiffness of the contact; a contact law holds for small penetrations"
+            what += f"clearance of {readable(contact.clearance, 'm')}; a contact law holds for small penetrations"
+            where, remedy = f"joints.{contact.joint}.contact", "check the stiffness of the contact"
             yield Finding.warning("simulate.soft", where, what, remedy, depth=depth, clearance=contact.clearance)
     for contact in {contact.joint: contact for contact in motion.contacts.each}.values():
         law = run.system.mechanism.effective_joints[contact.joint].contact

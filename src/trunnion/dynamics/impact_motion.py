@@ -14,7 +14,7 @@ cases change by the worst place first, see `active.settled`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -24,14 +24,17 @@ from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.active import MEET as SLOW
-from trunnion.dynamics.active import Mode, Modes, settled
-from trunnion.dynamics.active_motion import ActiveMotion, OpenContact, step_nodes
+from trunnion.dynamics.active import RowMode, RowModes, settled
+from trunnion.dynamics.active_motion import ActiveMotion, OpenContact
 from trunnion.dynamics.bordered import nearest
-from trunnion.dynamics.solution import Event, Impact, Stretch
-from trunnion.dynamics.state import Linear, Moment
+from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
+from trunnion.dynamics.rates import Dynamics
+from trunnion.dynamics.solution import Event, Impact
+from trunnion.dynamics.start import Places, load_times
+from trunnion.dynamics.state import FreeMotion, Linear, Mode, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
-__all__ = ["OPEN", "STICK", "ImpactMotion", "Struck", "strike"]
+__all__ = ["OPEN", "STICK", "ImpactMotion", "Struck", "integration_of", "strike"]
 
 Array = NDArray[np.float64]
 
@@ -47,7 +50,7 @@ class Struck(NamedTuple):
 
     impulse: Array
     after: Array
-    cases: Modes
+    cases: RowModes
     loss: float
     kept: float = 1.0
 
@@ -84,7 +87,7 @@ def _struck(delassus: Array, before: Array, restitution: Array, friction: Array)
     places = len(restitution)
     back = -restitution * np.minimum(before[:places], 0.0)
 
-    def objections(cases: Modes) -> Mapping[int, Mode] | None:
+    def objections(cases: RowModes) -> Mapping[int, RowMode] | None:
         impulse, after = _solved(delassus, before, back, friction, cases)
         return _objections(impulse, after, before, back, friction, cases)
 
@@ -97,7 +100,7 @@ def _struck(delassus: Array, before: Array, restitution: Array, friction: Array)
     return Struck(impulse, after, cases, -0.5 * float(impulse @ (before + after)))
 
 
-def _solved(delassus: Array, before: Array, back: Array, friction: Array, cases: Modes) -> tuple[Array, Array]:
+def _solved(delassus: Array, before: Array, back: Array, friction: Array, cases: RowModes) -> tuple[Array, Array]:
     """Impulses and rates after of one case: as many equations as places that exchange something."""
     places = len(cases)
     unknown, targets, spread = list[int](), list[float](), np.zeros((2 * places, 2 * places))
@@ -125,14 +128,14 @@ def _senses(before: Array) -> list[int]:
 
 
 def _objections(
-    impulse: Array, after: Array, before: Array, back: Array, friction: Array, cases: Modes
-) -> Mapping[int, Mode] | None:
+    impulse: Array, after: Array, before: Array, back: Array, friction: Array, cases: RowModes
+) -> Mapping[int, RowMode] | None:
     """The place that breaks its law most, and what it seems to do instead; None: the equations of a case, which were
     singular, are not kept."""
     places, senses = len(cases), _senses(before)
     normal, tangent, size = impulse[:places], impulse[places:], CLOSE * max(float(np.max(np.abs(impulse))), 1e-300)
     speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
-    worst: list[tuple[float, int, Mode]] = [(1.0, -1, OPEN)]
+    worst: list[tuple[float, int, RowMode]] = [(1.0, -1, OPEN)]
     for k, case in enumerate(cases):
         gap, slip = (after[k] - back[k]) / speed, after[places + k] / speed
         if case is OPEN:
@@ -187,17 +190,6 @@ class ImpactMotion(ActiveMotion):
                 left = self.friction[k] * touches.normal[k] - np.abs(touches.friction[k])
                 values[self.count + k] = onset.sense * touches.slip[k] if onset.sense else left
         return values
-
-    def _measured(self, stretch: Stretch) -> None:
-        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step."""
-        if not self._open:
-            return
-        times, weights = step_nodes(stretch.begin, stretch.end)
-        touches = self._look(stretch.state, times)
-        for k, contact in self._open.items():
-            contact.force = np.fmax(contact.force, float(np.max(touches.normal[k])))
-            contact.impulse += float(weights @ touches.normal[k])
-            contact.wear += float(weights @ np.abs(touches.normal[k] * touches.slip[k]))
 
     def _met(self, k: int, time: float, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
@@ -390,3 +382,16 @@ class ImpactMotion(ActiveMotion):
         """Why a state has no acceleration; empty if it has one."""
         cause = super()._cause(time, row)
         return "no_contact_force" if cause == "no_acceleration" and any(self.onsets) else cause
+
+
+def integration_of(
+    motion: FreeMotion, rates: Dynamics, load_places: Places, duration: float, tolerance: float,
+    progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS, start: float = 0.0,
+    mode: Mode | None = None,
+) -> Integration:  # fmt: skip
+    """What integrates a motion. duration, evaluations, start, mode: see `Integration`."""
+    kind = ImpactMotion if any(contact.rigid for contact in motion.contacts.each) else ActiveMotion
+    return kind(
+        motion, rates, duration, tolerance, load_places, progress, load_times(motion, duration),
+        evaluations, mode or Mode(), start,
+    )  # fmt: skip

@@ -31,10 +31,11 @@ from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
-__all__ = ["MOST_EVALUATIONS", "Integration"]
+__all__ = ["FINEST", "MOST_EVALUATIONS", "Integration"]
 
 Array = NDArray[np.float64]
 
+FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
 MOST_EVENTS = 100_000
 MOST_EVALUATIONS = 2_000_000  # of the forces, if not stated otherwise
 WALK = 25  # evaluations by machine code that take about as long as a walk through the modules

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.compiled_rates import Codes, rates_of
-from trunnion.dynamics.prepared import CYCLES, integration_of
-from trunnion.dynamics.start import initial_row, places
+from trunnion.dynamics.impact_motion import integration_of
+from trunnion.dynamics.start import CYCLES, initial_row, places
 from trunnion.dynamics.started import FIGURES, DriveCourse
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import MechanismError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -15,10 +15,11 @@ from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.dynamics.touching import Closed, Contacts
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, Motion
-from trunnion.solve.system import law_of, law_parameters
+from trunnion.solve.system import felt, law_of, law_parameters
+from trunnion.solve.track import carried_on
 
 __all__ = [
-    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "kinetic_energy",
+    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "bridged", "kinetic_energy",
     "potential_energy", "works_of",
 ]  # fmt: skip
 
@@ -154,6 +155,62 @@ class Walks:
         parts = [(state.gap, state.rate, state.slip, push.normal, push.friction)
                  for state, push in motion.contacts.pushes(walk, onsets)]  # fmt: skip
         return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
+
+
+WIDTH = 0.02  # rad, or of the size: from a change point to the first place at which rates are asked for
+PLACES = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # in such widths
+APART = 8.0  # widths to the next change point
+
+
+@dataclass(frozen=True)
+class Bridged:
+    """Rates of one free coordinate, beside some of its places by the polynomial through those farther off.
+
+    Where the links go on smoothly through a pose in which two assemblies meet, so do the rates, if nothing rubs. But
+    the digits of the accelerations are lost there like the third power of the distance: the place of a pin that two
+    links in line hold is known across them only as well as rounding over the distance.
+
+    places: of change points; period: after which they come again, None if they do not.
+    """
+
+    inner: Dynamics
+    places: Sequence[float]
+    period: float | None
+    width: float
+
+    def __call__(self, at: Moment) -> Rates:
+        """The rates; one lane."""
+        away = float(at.q[0, 0]) - np.array(self.places)
+        if self.period is not None:
+            away -= self.period * np.round(away / self.period)
+        nearest = float(away[np.argmin(np.abs(away))])
+        if not abs(nearest) < self.width:
+            return self.inner(at)
+        about = [self.inner(at._replace(q=at.q - nearest + place * self.width)) for place in PLACES]
+        second, others = (
+            carried_on(self.width * PLACES, np.array(numbers, float).T, nearest)
+            for numbers in ([state.second for state in about], [state.others for state in about])
+        )
+        return Rates(second, others, all(state.sound for state in about), any(state.locked for state in about))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+
+def bridged(motion: FreeMotion, rates: Dynamics) -> Dynamics:
+    """The rates of a motion, through the change points that it passes where nothing rubs."""
+    system, run = motion.system, motion.run
+    if len(system.mechanism.drivers) != 1 or felt(system, motion.values):
+        return rates
+    times = [time for number, met in run.chosen.meetings.items() if motion.passes(number) for time in met.crossed]
+    if not times:
+        return rates
+    (name,) = system.mechanism.drivers
+    places = np.sort([single(system.drive(run.values, name, time)[0]) for time in times])
+    span = single(system.span(run.values, name).peak) * run.cycle.duration if run.cycle.periodic else None
+    gaps = np.diff(places if span is None else [*places, places[0] + span])
+    width = min(WIDTH if system.turns(name) else WIDTH * motion.size, *(gap / APART for gap in gaps), np.inf)
+    return Bridged(rates, list(places), span, width)
 
 
 def beside(motion: FreeMotion, at: Moment, second: Sequence[Number] | Array, back: Backward | None) -> list[Number]:

@@ -1,51 +1,58 @@
-"""The books of a motion in time: variables, energy, events, summary and findings, gathered into the result."""
+"""The result of a motion in time: variables at its rows as `analyse` has them, energy, events, summary and findings.
+
+A motion with joints in play is shown as one of the mechanism that was stated: with these joints, and without what
+stands in for them; beside it stands what contacts and impacts come to.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import periodogram
 
 from trunnion.algebra.course import Accuracy, Courses
+from trunnion.algebra.plane import Wrench
+from trunnion.algebra.space import moment_at
+from trunnion.algebra.vector import dot
+from trunnion.cycle import fill
 from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
-from trunnion.dynamics.filling import (
-    CONTACT,
-    FEWEST,
-    FREQUENCY,
-    IMPACT,
-    SPECTRUM,
-    Books,
-    impact_arrays,
-    impact_figures,
-    spectrum,
-)
 from trunnion.dynamics.findings import motion_findings, stated_drivers, undefined
 from trunnion.dynamics.motor import switched
-from trunnion.dynamics.rates import CLUTCH, WORKS
+from trunnion.dynamics.opened import Opened, in_play
+from trunnion.dynamics.rates import CLUTCH, WORKS, kinetic_energy, potential_energy
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
-from trunnion.dynamics.solution import Event, Solution
+from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
 from trunnion.dynamics.started import steady_figures
-from trunnion.dynamics.state import FreeMotion
-from trunnion.errors import Finding
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Contacts, ContactState, Push
+from trunnion.errors import Finding, Status
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
 from trunnion.results.scales import Scales
+from trunnion.solve.backward import Backward
+from trunnion.solve.contacts import bearing_middle
+from trunnion.solve.forward import Forward, SpatialWalk
+from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOTION", "Found", "result_of"]
+__all__ = ["MOTION", "Books", "Found", "filled", "result_of", "spectrum"]
 
 Array = NDArray[np.float64]
+Touched = Sequence[tuple[ContactState, Push]]
 
 # what there is beside the variables of a cycle
 MOTION: dict[str, Variable] = {
@@ -70,6 +77,186 @@ WORDS = dict(zip((*WORKS, IN_CONTACTS, CLUTCH), (
     "work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
     "work lost in contacts", "work lost in the clutch",
 ), strict=True))  # fmt: skip
+CONTACT: dict[str, Variable] = {
+    "contact_gap": Variable(("contact", "time"), "m", "gap of the contact, negative where it touches"),
+    "contact_normal_force": Variable(("contact", "time"), "N", "normal force of the contact"),
+    "contact_friction_force": Variable(("contact", "time"), "N", "friction force of the contact, against its slip"),
+    "contact_slip": Variable(("contact", "time"), "m/s", "slip of the surfaces"),
+    "contact_touching": Variable(("contact", "time"), "1", "1 while the contact touches", np.int8),
+    "contact_offset": Variable(
+        ("contact", "axis", "time"), "m", "offset of the pin in its hole, of a corner in its guide; in the hole's axes"
+    ),
+    "contact_energy": Variable(("time",), "J", "elastic energy in the contacts"),
+    "work_contact": Variable(("time",), "J", "work lost in the contacts since the start, friction in them included"),
+}
+IMPACT: dict[str, Variable] = {
+    "impact_begin": Variable(("impact",), "s", "time at which a contact begins"),
+    "impact_end": Variable(("impact",), "s", "time at which it ends"),
+    "impact_approach": Variable(("impact",), "m/s", "speed of approach where it begins"),
+    "impact_separation": Variable(("impact",), "m/s", "speed of separation where it ends"),
+    "impact_force": Variable(("impact",), "N", "largest normal force"),
+    "impact_depth": Variable(("impact",), "m", "largest penetration"),
+    "impact_impulse": Variable(("impact",), "N s", "impulse of the normal force"),
+    "impact_wear": Variable(("impact",), "J", "wear index, integral of normal force times slip"),
+}
+FREQUENCY = Variable(("frequency",), "Hz", "frequency")
+SPECTRUM = Variable(("contact", "frequency"), "N", "amplitude of the normal force by frequency, with Hann's window")
+FEWEST = 16  # rows from which there is a spectrum
+
+PORTION = 10_000  # times whose books are read at once: these are many numbers
+BLURRED = 1e3  # condition from which the velocities of links in line, and so energies, are not told to all digits
+SHORTEST = 1e-12  # of the duration: a step that has no course of its own
+# of what an integration knows; a step is one panel, but where a force bends or jumps within it
+ACCURACY = Accuracy(tolerance=1e-6, widest=1.0, rounds=10, most=16)
+ROUNDING = 1e-12  # of the energy turned over: a work that is none
+WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
+
+
+# ---- variables at rows ------------------------------------------------------------------------------------------
+
+
+class Books(NamedTuple):
+    """What is known at the rows of a result: variables as `analyse` has them, state, accelerations of the free
+    coordinates, energies (kinetic, potential, of contacts), works, where the mechanism rests, what `CONTACT` has, and
+    which joints stick, (joint, time)."""
+
+    time: Array
+    arrays: Mapping[str, Array]
+    labels: dict[str, list[str]]
+    at: Moment
+    seconds: Array
+    energies: Array
+    works: Array
+    resting: NDArray[np.bool_]
+    contacts: dict[str, Array]
+    sticking: NDArray[np.bool_] | None = None
+
+
+def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened | None = None) -> Books:
+    """Every variable over rows up to where a motion ends, by walks, as `analyse` has them; NaN after it.
+
+    time: s, of the rows, rising; opened: where joints in play were taken out, so that the rows are of those stated.
+    """
+    stated, layout = None if opened is None else Stated(opened, motion.contacts), solution.layout
+    system = (motion.run if stated is None else stated.run).system
+    arrays, (rows, which) = fill.allocate(system, len(time)), solution.at(time)
+    seconds, energies = np.full((layout.coordinates, len(time)), np.nan), np.full((2, len(time)), np.nan)
+    sizes = {"contact": len(motion.contacts.each), "axis": len(system.axes), "time": len(time)}
+    contacts = {
+        name: np.zeros([sizes[dim] for dim in variable.dims]) * (1 if variable.dtype is np.int8 else np.nan)
+        for name, variable in CONTACT.items()
+    }
+    sticking, resting = np.zeros((len(system.joints), len(time)), bool), np.zeros(len(time), bool)
+    arrays["status"][...] = Status.NOT_CONVERGED
+    for lanes, stretch in _alike(solution, which):
+        motion.begin(stretch.snapshot)
+        at = layout.moment(time[lanes], rows[:, lanes], stretch.mode)
+        accelerated = motion.accelerate(at)
+        seconds[:, lanes], back = accelerated.second, accelerated.back
+        energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
+        touched = motion.contacts.pushes(back.walk, accelerated.onsets)
+        for k, ((state, push), onset) in enumerate(zip(touched, accelerated.onsets, strict=True)):
+            numbers = state.gap, push.normal, push.friction, state.slip, float(onset is not None)
+            for name, number in zip(CONTACT, numbers, strict=False):
+                contacts[name][k, lanes] = number
+            for axis in range(len(system.axes)):
+                contacts["contact_offset"][k, axis, lanes] = state.offset[axis]
+        contacts["contact_energy"][lanes] = sum(push.stored for _, push in touched)
+        stated_back = back if stated is None else stated.back(back, touched)
+        window = slice(int(lanes[0]), int(lanes[-1]) + 1)
+        fill.fill_chunk(arrays, stated_back, window)
+        if stated is not None:
+            stated.fill(arrays, stated_back.walk, touched, window)
+        resting[lanes] = stretch.resting
+        for name, sense in zip(motion.resisted, stretch.mode.senses, strict=False):
+            sticking[list(system.joints).index(name), lanes] = sense == 0
+    for array in arrays.values():  # there is no motion any more
+        if array.dtype == np.float64:
+            array[..., which < 0] = np.nan
+    moments, works = layout.moment(time, rows), layout.works(rows)
+    fill.unwrap(arrays, system, motion.values_at(moments, np.nan_to_num(seconds)), time)
+    if stated is not None:
+        energies, contacts["work_contact"] = np.vstack([energies, contacts["contact_energy"]]), works[-1]
+    by_joint = sticking if motion.resisted and motion.several else None
+    return Books(time, arrays, fill.labels(system), moments, seconds, energies, works, resting, contacts, by_joint)
+
+
+def _alike(solution: Solution, which: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Stretch]]:
+    """Runs of rows that one walk can solve: of the same sense, switches and assembly. which: stretch of every row."""
+
+    def key(row: Any) -> object:
+        stretch = solution.stretches[which[row]]
+        return stretch.mode, stretch.resting, id(stretch.snapshot)
+
+    for _, rows in itertools.groupby(np.flatnonzero(which >= 0), key):
+        lanes = np.array(list(rows))
+        for part in np.split(lanes, range(CHUNK, len(lanes), CHUNK)):
+            yield part, solution.stretches[which[part[0]]]
+
+
+class Stated:
+    """A motion whose joints in play were taken out, as one of the mechanism that was stated."""
+
+    def __init__(self, opened: Opened, contacts: Contacts) -> None:
+        self.run, self.parts, self.contacts = opened.run, opened.parts, contacts
+        self.cut = in_play(self.run.system.mechanism)
+        local, holes = self.run.system.elements(self.run.values), self.run.system.holes(self.run.values)
+        self.local = {**local, **{key: hole for key, hole in holes.items() if key[1] in self.cut}}
+
+    def back(self, back: Backward, touched: Touched) -> Backward:
+        """What a walk of the opened mechanism came to, with the stated joints: those in play have the forces of their
+        contacts, those that chains stand in for the reaction of the last part."""
+        system, opened = replace(self.run.system), back.walk.system
+        vars(system)["groups"] = opened.groups
+        values, local = {**self.run.values, **back.walk.values}, {**self.local, **back.walk.local}
+        motions = {link: back.walk.motions[link] for link in system.mechanism.effective_links}
+        walk = type(back.walk)(system, values, local, motions, back.walk.time, poses=back.walk.poses)
+        zero, joints = walk.algebra.ZERO_LOAD, [*self.cut, *self.parts]
+        reactions, rubbing = dict(back.reactions), {**back.friction_wrenches, **dict.fromkeys(joints, zero)}
+        friction: dict[str, Any] = {**back.friction, **dict.fromkeys(joints, 0.0)}
+        for joint in joints:
+            reaction = back.reactions[self.parts[joint][-1]] if joint in self.parts else zero
+            second = system.joints[joint][1][1]
+            for contact, (state, push) in zip(self.contacts.each, touched, strict=True):
+                if contact.joint == joint:
+                    along = push._replace(normal=0.0 * push.normal)
+                    reaction = walk.algebra.added(reaction, dict(contact.action(back.walk, state, push).on)[second])
+                    loss = dict(contact.action(back.walk, state, along).on)[second]
+                    rubbing[joint] = walk.algebra.added(rubbing[joint], loss)
+            if isinstance(walk, SpatialWalk):
+                friction[joint] = dot(moment_at(rubbing[joint], bearing_middle(walk, joint)), walk.ends(joint)[1].z)
+            else:  # about the joint's point on the second link
+                moment = walk.algebra.moment_at(reaction, walk.point(second, joint).place)
+                reaction = Wrench(reaction.x, reaction.y, moment)
+                friction[joint] = moment if system.turns(joint) else 0.0
+            reactions[joint] = reaction
+        return replace(
+            back, walk=walk, reactions=reactions, friction=friction, friction_wrenches=rubbing, margin=None,
+            losses={**dict.fromkeys(joints, 0.0), **back.losses},
+            resting={**dict.fromkeys(joints, np.False_), **back.resting},
+        )  # fmt: skip
+
+    def fill(self, arrays: Mapping[str, Array], walk: Forward, touched: Touched, window: slice) -> None:
+        """What joints in play have beside what any joint has: the power lost in their contacts, and in the plane how
+        they slide and turn."""
+        for joint in self.cut:
+            row = list(self.run.system.joints).index(joint)
+            arrays["friction_power"][row, window] = -sum(
+                push.friction * state.slip
+                for contact, (state, push) in zip(self.contacts.each, touched, strict=True)
+                if contact.joint == joint
+            )
+            if isinstance(walk, SpatialWalk):
+                continue
+            first, second = (walk.motions[link] for link in walk.system.joints[joint][1])
+            arrays["joint_rotation_velocity"][row, window] = second.twist.w - first.twist.w
+            arrays["joint_rotation_acceleration"][row, window] = second.acceleration.w - first.acceleration.w
+            motion = walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint)
+            for suffix, numbers in zip(("", "_velocity", "_acceleration"), motion, strict=True):
+                arrays[f"joint_slide{suffix}"][row, window] = numbers[1]
+
+
+# ---- courses between rows ---------------------------------------------------------------------------------------
 
 
 class Course(NamedTuple):
@@ -159,6 +346,17 @@ class Found(NamedTuple):
         return self.course.worst / self.course.turned_over if self.course.turned_over > 0 else 0.0
 
 
+def _residual(works: Array, energies: Array) -> Array:
+    """What works and energies differ by at every time, J."""
+    # to friction, and to contacts; from the first time on, which is that after a stop at the start
+    drive, loads, springs, *lost = works - works[:, :1]
+    energy = energies.sum(axis=0)
+    return np.asarray(drive + loads + springs - sum(lost) - (energy - energy[0]))
+
+
+# ---- the result -------------------------------------------------------------------------------------------------
+
+
 def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) -> Result:
     """The result of a motion in time. run: of the mechanism as it was stated, its joints in play included."""
     solution, books, contacts = integrated.solution, integrated.books, motion.contacts.each
@@ -199,15 +397,18 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) 
         along, coordinates = {"time": Variable(("time",), "s", "time from the start")}, {"time": books.time}
         if contacts:
             labels["contact"] = list(motion.contacts.labels)
-            parts |= described(books.touches.arrays(books.works[-1]), CONTACT)
-            parts |= described(impact_arrays(solution.impacts), IMPACT)
-            rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
+            parts |= described(books.contacts, CONTACT)
+            impacts = {name: [getattr(impact, name.removeprefix("impact_")) for impact in solution.impacts]
+                       for name in IMPACT}  # fmt: skip
+            parts |= described({name: np.array(row, float) for name, row in impacts.items()}, IMPACT)
+            forces = books.contacts["contact_normal_force"]
+            rows = np.flatnonzero(np.all(np.isfinite(forces), axis=0))
             rows = rows if solution.ended is None else rows[:-1]  # the end is not evenly spaced
             rigid = any(contact.rigid for contact in contacts)  # their impacts have no force
             if len(rows) >= FEWEST and not rigid:
                 along["frequency"] = FREQUENCY
-                coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
-                parts |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
+                coordinates["frequency"], amplitude = spectrum(books.time[rows], forces[:, rows])
+                parts |= described({"contact_force_amplitude": amplitude}, {"contact_force_amplitude": SPECTRUM})
         return dataset_of("motion", parts, labels, attributes, described(coordinates, along))
 
     return Result(attributes, build)
@@ -242,24 +443,17 @@ def _beside(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> d
     }
 
 
-# ---- energy ---------------------------------------------------------------------------------------------------
+def spectrum(time: Array, forces: Array) -> tuple[Array, Array]:
+    """Frequencies, Hz, and one-sided amplitudes, N, (…, frequency), of forces (…, time) at equally spaced times, s.
 
-
-def _residual(works: Array, energies: Array) -> Array:
-    """What works and energies differ by at every time, J."""
-    # to friction, and to contacts; from the first time on, which is that after a stop at the start
-    drive, loads, springs, *lost = works - works[:, :1]
-    energy = energies.sum(axis=0)
-    return np.asarray(drive + loads + springs - sum(lost) - (energy - energy[0]))
-
-
-PORTION = 10_000  # times whose books are read at once: these are many numbers
-BLURRED = 1e3  # condition from which the velocities of links in line, and so energies, are not told to all digits
-SHORTEST = 1e-12  # of the duration: a step that has no course of its own
-# of what an integration knows; a step is one panel, but where a force bends or jumps within it
-ACCURACY = Accuracy(tolerance=1e-6, widest=1.0, rounds=10, most=16)
-ROUNDING = 1e-12  # of the energy turned over: a work that is none
-WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
+    A harmonic of amplitude A that lies on a frequency has A there and, by Hann's window, A/2 at its two neighbours.
+    Source: F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform, Proc. IEEE 66
+    (1978) 51-83, doi:10.1109/PROC.1978.10837.
+    """
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    frequencies, powers = periodogram(forces, rate, "hann", detrend=False, scaling="spectrum")
+    powers[..., 1 : -1 if len(time) % 2 == 0 else None] *= 2.0  # of a harmonic A²/2, of a mean its square
+    return frequencies, np.sqrt(powers)
 
 
 # ---- summary --------------------------------------------------------------------------------------------------
@@ -291,9 +485,38 @@ def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) ->
             if value > 0:
                 subject, when = f"reaction in {joint}", f"at {time:.4g} s"
                 figures.append(Figure(f"{joint}.reaction_max", subject, value, "N", "largest", when))
-    figures += impact_figures(motion.contacts.labels, solution.impacts, solution.end)
+    figures += _impact_figures(motion.contacts.labels, solution.impacts, solution.end)
     for key, work in zip(solution.layout.works_named, course.last.works, strict=True):
         if abs(work[0]) > scales.floor("J"):
             figures.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))
     figures.append(Figure("energy_residual", "largest error of the energy account", course.worst, "J"))
+    return figures
+
+
+def _impact_figures(labels: Sequence[str], impacts: Sequence[Impact], end: float) -> list[Figure]:
+    """What a summary says of every contact: how often and how hard it touches, for how long, and how much it wears."""
+    figures: list[Figure] = []
+    for label in labels:
+        of_contact = [impact for impact in impacts if impact.label == label]
+        figures.append(Figure(f"{label}.impacts", f"contacts of {label}", float(len(of_contact)), "1"))
+        if not of_contact:
+            continue
+        long = sum((impact.end if np.isfinite(impact.end) else end) - impact.begin for impact in of_contact)
+        if struck := [impact for impact in of_contact if np.isnan(impact.force)]:  # of rigid bodies: without a force
+            hardest = max(struck, key=lambda impact: impact.impulse)
+            subject, when = f"impulse in {label}", f"at {hardest.begin:.4g} s"
+            figures.append(Figure(f"{label}.impulse_max", subject, hardest.impulse, "N s", "largest", when))
+        if pushed := [impact for impact in of_contact if np.isfinite(impact.force)]:
+            most = max(pushed, key=lambda impact: impact.force)
+            subject, when = f"contact force in {label}", f"in the contact from {most.begin:.4g} s"
+            figures.append(Figure(f"{label}.contact_force_max", subject, most.force, "N", "largest", when))
+        if (depth := max(impact.depth for impact in of_contact)) > 0:
+            figures.append(Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"))
+        speed, wear = max(impact.approach for impact in of_contact), sum(impact.wear for impact in of_contact)
+        share = long / end if end else np.nan
+        figures += [
+            Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest"),
+            Figure(f"{label}.contact_time", f"time in contact of {label}", share, "1", "of all"),
+            Figure(f"{label}.wear", f"wear index of {label}", wear, "J"),
+        ]
     return figures

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import single
-from trunnion.dynamics.checks import check_start, refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_rates import rates_of
-from trunnion.dynamics.filling import filled
-from trunnion.dynamics.integrate import MOST_EVALUATIONS
+from trunnion.dynamics.findings import check_start, refuse, refuse_massless, refuse_undetermined
+from trunnion.dynamics.impact_motion import integration_of
+from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, opened
-from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
-from trunnion.dynamics.result import Found, result_of
-from trunnion.dynamics.start import initial_row, places
+from trunnion.dynamics.result import Found, filled, result_of
+from trunnion.dynamics.start import CYCLES, initial_row, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.steady_cycle import steady as steady_result
 from trunnion.dynamics.touching import contacts_of

@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Courses
+from trunnion.algebra.panels import FIT, POINTS
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import Mode, Moment
 
-__all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch", "by_time"]
+__all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch", "by_time", "over_steps", "step_nodes"]
 
 Array = NDArray[np.float64]
 
@@ -33,8 +35,8 @@ class Event(NamedTuple):
 
 class Impact(NamedTuple):
     """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
-    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s,
-    and what the contact law has lost, J."""
+    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, and impulse ∫ F dt,
+    N s."""
 
     label: str
     begin: float
@@ -45,7 +47,6 @@ class Impact(NamedTuple):
     depth: float
     wear: float
     impulse: float
-    loss: float = 0.0
 
 
 class Stretch(NamedTuple):
@@ -130,3 +131,15 @@ def by_time(dense: Callable[[Array], Array], low: float, high: float, k: int) ->
         return rows
 
     return state
+
+
+def step_nodes(begins: Array) -> Array:
+    """Times at whose values the polynomials of steps are, (step, node), s; begins: of the steps, and the last end."""
+    return np.asarray(0.5 * (begins[1:] + begins[:-1])[:, None] + 0.5 * np.diff(begins)[:, None] * POINTS)
+
+
+def over_steps(begins: Array, numbers: Array) -> Courses:
+    """Numbers at `step_nodes`, (row, step, node), as courses: each step is a polynomial, as is its dense output."""
+    coefficients = np.moveaxis(numbers @ FIT.T, 0, 1)
+    sizes = np.max(np.abs(numbers), axis=(1, 2))
+    return Courses(begins, coefficients, np.zeros(len(begins) - 1, np.intp), begins, sizes, numbers[0].size)

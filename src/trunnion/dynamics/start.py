@@ -13,12 +13,13 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
 
-__all__ = ["Places", "initial_row", "load_times", "places"]
+__all__ = ["CYCLES", "Places", "initial_row", "load_times", "places"]
 
 Array = NDArray[np.float64]
 
 SCANNED = 4001  # times at which ends of loads are looked for: most are linear in the time, and found exactly
 CLOSE = 1e-9  # of the way: bends that are one
+CYCLES = 10  # of the nominal motion: the duration if none is stated
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""What is said of a motion that goes round and round: how it starts, how evenly it then runs, how it runs down."""
+"""Courses of a motion in time over its steps, and what they tell of one that goes round and round: how it starts, how
+evenly it then runs, how it runs down."""
 
 from __future__ import annotations
 
@@ -10,11 +11,13 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from trunnion.dynamics.solution import Solution
+from trunnion.algebra.course import Courses
+from trunnion.algebra.panels import FIT, ON_POINTS, ORDER
+from trunnion.dynamics.solution import Solution, over_steps, step_nodes
 from trunnion.dynamics.state import FreeMotion
 from trunnion.results.figure import Figure
 
-__all__ = ["FIGURES", "NODES", "DriveCourse", "steady_figures"]
+__all__ = ["FIGURES", "DriveCourse", "steady_figures"]
 
 Array = NDArray[np.float64]
 
@@ -25,95 +28,88 @@ STARTED = 0.95  # of the mean speed of the last turn: from then on it has starte
 BEGUN = 0.5  # of that: a motion that begins faster does not start
 FEWEST = 3  # whole turns of which one speaks of a steady one
 BACKWARD = 1e-9  # of a turn, by which one that goes round and round may seem to go back
+COORDINATE, SPEED, EFFORT = range(3)  # rows of a drive
 
-DEGREE = 7  # of the dense output of DOP853
-NODES: Array = -np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)  # of a step, from its begin −1 to its end 1
-FINE: Array = np.linspace(-1.0, 1.0, 33)  # places in a step at which its largest number is looked for
-_COEFFICIENTS: Array = np.asarray(np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)), np.float64)
-_DERIVED: Array = chebyshev.chebvander(NODES, DEGREE - 1) @ chebyshev.chebder(_COEFFICIENTS)
-_FINER: Array = chebyshev.chebvander(FINE, DEGREE) @ _COEFFICIENTS
+# from values at the nodes of a panel two long to those of the derivative there
+DERIVED: Array = np.asarray(ON_POINTS[:-1].T @ chebyshev.chebder(FIT), np.float64)
 
 
 @dataclass(frozen=True)
 class DriveCourse:
-    """Time, coordinate, speed and effort of a drive at the nodes of every step, (step, node).
+    """Coordinate, speed and effort of a drive as courses over the steps; a time is found from a coordinate, or a
+    largest speed, as exactly as the motion itself is known.
 
-    Each step is a polynomial, as it is with its dense output: a time is found from a coordinate, or a largest speed, as
-    exactly as the motion itself is known.
+    sense: in which the coordinate goes, +1 or −1.
     """
 
-    time: Array
-    coordinate: Array
-    speed: Array
-    effort: Array
+    courses: Courses
+    sense: float
 
     @classmethod
     def of(cls, motion: FreeMotion, solution: Solution, i: int) -> DriveCourse:
-        """That of one free coordinate."""
-        steps = list[Array]()
-        for stretch in solution.stretches:
-            half = 0.5 * (stretch.end - stretch.begin)
-            if not half > 0.0:
-                continue
-            time = stretch.begin + half * (1.0 + NODES)
+        """That of one free coordinate; the motion has a step."""
+        steps = [stretch for stretch in solution.stretches if stretch.end > stretch.begin]
+        begins = np.array([*(stretch.begin for stretch in steps), solution.end])
+        numbers = np.empty((3, len(steps), ORDER))
+        for k, (stretch, time) in enumerate(zip(steps, step_nodes(begins), strict=True)):
             at = stretch.at(solution.layout, time)
-            second = at.rate @ _DERIVED.T / half
+            second = at.rate @ DERIVED.T / (0.5 * (stretch.end - stretch.begin))
             senses = {} if motion.rests(at) else motion.senses(at)
             effort = motion.given(at, 0.0 * second if stretch.resting else second, senses)[i]
-            steps.append(np.array([time, at.q[i], at.rate[i], effort]))
-        return cls(*np.stack(steps or [np.zeros((4, len(NODES)))], axis=1))
+            numbers[:, k] = at.q[i], at.rate[i], effort
+        courses = over_steps(begins, numbers)
+        first, last = courses.at(begins[[0, -1]])[COORDINATE]
+        return cls(courses, -1.0 if last < first else 1.0)
+
+    @cached_property
+    def time(self) -> Array:
+        """Nodes and ends of the steps, s."""
+        return np.union1d(self.courses.edges, step_nodes(self.courses.edges).ravel())
 
     @cached_property
     def gone(self) -> Array:
-        """How far the coordinate has gone from where it began, in the sense in which it goes, (step, node)."""
-        gone = self.coordinate - self.coordinate[0, 0]
-        return np.asarray(-gone if gone[-1, -1] < 0.0 else gone)
+        """How far the coordinate has gone at these times from where it began, in its sense."""
+        coordinates = self.courses.at(self.time)[COORDINATE]
+        return np.asarray(self.sense * (coordinates - coordinates[0]))
 
     @property
     def travel(self) -> float:
         """How far it has gone at the end."""
-        return float(self.gone[-1, -1])
+        return float(self.gone[-1])
 
     @cached_property
     def runs(self) -> bool:
         """Whether it goes round and round, one way, to the end."""
-        onward = bool(np.all(np.diff(self.gone.ravel()) >= -BACKWARD))
-        return onward and self.travel >= FEWEST * TURN and bool(self.speed[-1, -1] != 0.0)
+        onward = bool(np.all(np.diff(self.gone) >= -BACKWARD))
+        return onward and self.travel >= FEWEST * TURN and bool(self.courses.at(self.time[-1:])[SPEED, 0] != 0.0)
 
-    def at(self, gone: float, numbers: Array) -> float:
-        """A number, (step, node), where the coordinate has gone so far."""
-        step = min(int(np.searchsorted(self.gone[:, -1], gone)), len(self.gone) - 1)
-        motion_gone = _COEFFICIENTS @ self.gone[step]
+    def when(self, gone: float) -> float:
+        """The time at which the coordinate has gone so far, s."""
+        k = int(np.clip(np.searchsorted(self.gone, gone), 1, len(self.gone) - 1))
+        begin = self.courses.at(self.time[:1])[COORDINATE, 0]
 
-        def ahead(place: float) -> float:
-            return float(chebyshev.chebval(place, motion_gone)) - gone
+        def ahead(time: float) -> float:
+            return float(self.sense * (self.courses.at(np.array([time]))[COORDINATE, 0] - begin)) - gone
 
-        inside = ahead(-1.0) < 0.0 < ahead(1.0)
-        place = brentq(ahead, -1.0, 1.0, xtol=1e-15) if inside else (-1.0 if ahead(-1.0) >= 0.0 else 1.0)
-        return float(chebyshev.chebval(place, _COEFFICIENTS @ numbers[step]))
+        low, high = (float(time) for time in self.time[k - 1 : k + 1])
+        if not ahead(low) < 0.0 < ahead(high):
+            return low if ahead(low) >= 0.0 else high
+        return float(brentq(ahead, low, high, xtol=1e-16, rtol=1e-15))
+
+    def largest(self, row: int, sign: float = 1.0, since: float | None = None) -> float:
+        """The largest value of a row, or of its opposite, since a time, s."""
+        courses = self.courses if since is None else self.courses.between(since, self.courses.edges[-1])
+        place = courses.extreme(lambda rows: rows[row], sign)
+        return np.nan if place is None else sign * place.value
 
     @cached_property
     def last_turn(self) -> float:
         """The time at which the last whole turn begins, s; NaN where it does not run steadily, round and round."""
         if not self.runs:
             return np.nan
-        begin, before = (self.at(self.travel - turns * TURN, self.time) for turns in (1, 2))
-        speed, earlier = TURN / (self.time[-1, -1] - begin), TURN / (begin - before)
-        return begin if abs(earlier - speed) <= STEADY * speed else np.nan
-
-    def largest(self, numbers: Array, since: float = -np.inf) -> float:
-        """The largest of a number, (step, node), since the coordinate has gone so far: between three places of a step
-        the vertex of their parabola."""
-        fine = numbers @ _FINER.T
-        fine[~(np.isfinite(fine) & (self.gone @ _FINER.T >= since))] = -np.inf
-        step, place = np.unravel_index(np.argmax(fine), fine.shape)
-        most = float(fine[step, place])
-        if 0 < place < len(FINE) - 1:
-            before, here, after = fine[step, place - 1 : place + 2]
-            bend = before - 2.0 * here + after
-            if np.isfinite(bend) and bend < 0.0:
-                most = float(here - (after - before) ** 2 / (8.0 * bend))
-        return most
+        begin, before = (self.when(self.travel - turns * TURN) for turns in (1, 2))
+        steady = abs((begin - before) / (self.time[-1] - begin) - 1.0) <= STEADY
+        return begin if steady else np.nan
 
     @np.errstate(all="ignore")
     def figures(self) -> dict[str, float]:
@@ -124,32 +120,28 @@ class DriveCourse:
         coefficient, (ω_max − ω_min)/ω_mean; peak_effort: the largest |effort|, N m or N.
         """
         figures = dict.fromkeys(FIGURES, np.nan)
-        figures["peak_effort"] = max(self.largest(self.effort), self.largest(-self.effort))
+        figures["peak_effort"] = max(self.largest(EFFORT), self.largest(EFFORT, -1.0))
         if np.isfinite(self.last_turn):
-            steady = float(TURN / (self.time[-1, -1] - self.last_turn))
-            speed, since = np.abs(self.speed), self.travel - TURN
-            first = self.at(since, speed)
-            most, least = max(self.largest(speed, since), first), min(-self.largest(-speed, since), first)
-            figures |= {"steady_speed": steady, "fluctuation": (most - least) / steady}
-            if abs(self.speed[0, 0]) < BEGUN * steady:
+            steady = float(TURN / (self.time[-1] - self.last_turn))
+            change = sum(self.largest(SPEED, sign, self.last_turn) for sign in (1.0, -1.0))
+            figures |= {"steady_speed": steady, "fluctuation": change / steady}
+            if abs(self.courses.at(self.time[:1])[SPEED, 0]) < BEGUN * steady:
                 figures["starting_time"] = self._started(TURN / (STARTED * steady))
         return figures
 
     def _started(self, limit: float) -> float:
         """The first time, s, at which the turn that ends there has taken no longer than a limit, s."""
-        gone, time = self.gone.ravel(), self.time.ravel()
 
-        def longer(place: float) -> float:
+        def longer(gone: float) -> float:
             """By how much the turn that ends here takes longer."""
-            return self.at(place, self.time) - self.at(place - TURN, self.time) - limit
+            return self.when(gone) - self.when(gone - TURN) - limit
 
-        takes = np.where(gone >= TURN, time - np.interp(gone - TURN, gone, time), np.inf)
+        takes = np.where(self.gone >= TURN, self.time - np.interp(self.gone - TURN, self.gone, self.time), np.inf)
         first = int(np.argmax(takes <= limit))
-        low = max(TURN, float(gone[max(first - len(NODES), 0)]))
-        high = float(gone[min(first + len(NODES), len(gone) - 1)])
+        low = max(TURN, float(self.gone[max(first - ORDER, 0)]))
+        high = float(self.gone[min(first + ORDER, len(self.gone) - 1)])
         inside = longer(high) < 0.0 < longer(low)
-        started = brentq(longer, low, high, rtol=1e-15) if inside else low if longer(low) <= 0.0 else high
-        return self.at(started, self.time)
+        return self.when(brentq(longer, low, high, rtol=1e-15) if inside else low if longer(low) <= 0.0 else high)
 
 
 def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
@@ -168,7 +160,7 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
             Figure(f"{name}.run_down", subject, rest - off, "s", "until it rests"),
             Figure(f"{name}.run_down_way", subject, end - begin, "rad" if turns else "m", "on its way"),
         ]
-    figures = DriveCourse.of(motion, solution, i).figures() if turns and solution.stretches else {}
+    figures = DriveCourse.of(motion, solution, i).figures() if turns and solution.end > 0.0 else {}
     told = [
         ("steady_speed", "speed_mean", f"speed of {name}", "rad/s", "mean of the last turn"),
         ("starting_time", "starting_time", f"starting time of {name}", "s", f"to {STARTED:.0%} of that speed"),

@@ -14,24 +14,24 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.cycle import summary
 from trunnion.cycle.positions import Positions, positions
 from trunnion.dynamics.compiled_rates import rates_of
-from trunnion.dynamics.filling import filled
 from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.integrate import MOST_EVALUATIONS
+from trunnion.dynamics.impact_motion import integration_of
+from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play
-from trunnion.dynamics.prepared import FINEST, integration_of
 from trunnion.dynamics.rates import Dynamics, Layout
-from trunnion.dynamics.solution import Solution
+from trunnion.dynamics.result import filled
+from trunnion.dynamics.solution import Solution, over_steps, step_nodes
 from trunnion.dynamics.start import Places, initial_row, places
-from trunnion.dynamics.started import DriveCourse
+from trunnion.dynamics.started import SPEED, DriveCourse
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
@@ -49,54 +49,45 @@ __all__ = ["Repeated", "UnsteadyError", "motion_law", "steady"]
 Array = NDArray[np.float64]
 
 
-DEGREE = 7  # of the polynomials, as of the dense output of DOP853
-# of a step, from its begin −1 to its end 1: within it, for forces may jump at its ends
-NODES: Array = -np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
-COEFFICIENTS: Array = np.asarray(np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)), np.float64)
-
-
 @dataclass(frozen=True)
 class Repeated:
-    """Coordinate, rate and second derivative over one cycle, as polynomials step by step.
+    """Coordinate, rate and second derivative over one cycle, step by step.
 
-    begins: of the steps, s, and the end of the last; parts: coefficients of Chebyshev polynomials, (number, step,
-    degree); advance: of the coordinate, rad or m, from cycle to cycle.
+    advance: of the coordinate, rad or m, from cycle to cycle.
     """
 
-    begins: Array
-    parts: Array
+    courses: Courses
     advance: float
 
     @classmethod
     def of(cls, motion: FreeMotion, solution: Solution) -> list[Repeated]:
         """Those of the free coordinates, over a solution that ends as it begins but for whole turns."""
         begins = np.array([stretch.begin for stretch in solution.stretches] + [solution.end])
-        time = 0.5 * (begins[1:] + begins[:-1])[:, None] + 0.5 * np.diff(begins)[:, None] * NODES
+        time = step_nodes(begins)
         books = filled(motion, solution, time.ravel())
+        numbers = np.array([books.at.q, books.at.rate, books.seconds]).reshape(3, -1, *time.shape)
         ends, _ = solution.at(np.array([0.0, solution.end]))
-        numbers = np.array([books.at.q, books.at.rate, books.seconds]).reshape(3, -1, *time.shape) @ COEFFICIENTS.T
-        return [cls(begins, numbers[:, i], float(ends[i, 1] - ends[i, 0])) for i in range(len(motion.names))]
+        return [
+            cls(over_steps(begins, numbers[:, i]), float(ends[i, 1] - ends[i, 0])) for i in range(len(motion.names))
+        ]
 
     @property
     def period(self) -> float:
         """How long a cycle takes, s."""
-        return float(self.begins[-1])
+        return self.courses.span
 
     def at(self, time: Number, parameters: Parameters) -> Drive:
         """As a motion law has it; `parameters` are not looked at. Of a dual time with its derivative."""
         moment = np.asarray(primal(time), float)
         cycles = np.floor(moment / self.period)
-        moment = moment - cycles * self.period
-        step = np.clip(np.searchsorted(self.begins, moment, side="right") - 1, 0, len(self.begins) - 2)
-        place = 2 * (moment - self.begins[step]) / (self.begins[step + 1] - self.begins[step]) - 1
-        basis = np.cos(np.arange(DEGREE + 1) * np.arccos(np.clip(place, -1.0, 1.0))[..., None])
-        value, rate, second = np.sum(self.parts[:, step] * basis, axis=-1)
+        rows = self.courses.at(np.ravel(moment - cycles * self.period))
+        value, rate, second = rows.reshape(3, *moment.shape)
         zero = time - primal(time)  # 0, and the derivative of a dual time
         return Drive(value + cycles * self.advance + rate * zero, rate + second * zero, second + 0.0 * zero)
 
     def span(self, parameters: Parameters) -> Span:
         """One cycle, from the nodes of the steps."""
-        values, rates = self.parts[:2] @ chebyshev.chebvander(NODES, DEGREE).T
+        values, rates = self.courses.on_nodes(self.courses.half > 0.0)[:2]
         one_way = bool(np.all(rates > 0.0) or np.all(rates < 0.0))
         return Span(self.period, True, False, one_way, float(np.max(np.abs(rates))), float(np.ptp(values)))
 
@@ -219,6 +210,8 @@ def _steady_cycle(
         end = longer * duration
         integration = integration_of(motion, rates, load_places, end, tolerance, progress, evaluations)
         solution = integration.run(initial_row(motion))
+        if not solution.end > 0.0:
+            raise UnsteadyError(motion_findings(motion, solution, motion.run))
         course = DriveCourse.of(motion, solution, first)
         if solution.ended or solution.stretches[-1].resting:
             break
@@ -244,7 +237,7 @@ def _why(motion: FreeMotion, solution: Solution, course: DriveCourse, first: int
         figures = {"driver": name, "turns": turns, "time": solution.end}
         none = Finding.error("simulate.not_round", f"drivers.{name}", what, remedy, **figures)
         return [none, *motion_findings(motion, solution, motion.run)]
-    takes = [course.at(course.travel - k * TURN, course.time) for k in range(3)]
+    takes = [course.when(course.travel - k * TURN) for k in range(3)]
     before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
     what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after {end}, changes by "
     what += f"{readable(last - before, 'rad/s')} a turn, and no speed is found that comes back"
@@ -267,12 +260,11 @@ class Section:
     ) -> None:  # fmt: skip
         self.motion, self.places, self.rates, self.tolerance, self.first = motion, load_places, rates, tolerance, first
         span = load_places.period if load_places.period is not None else TURN
-        start, gone = float(course.coordinate[0, 0]), course.travel
-        sense = 1.0 if course.coordinate[-1, -1] > start else -1.0
+        start, gone, sense = float(solution.at(np.zeros(1))[0][first, 0]), course.travel, course.sense
         self.begin = single(motion.system.drive(motion.values, motion.names[first], 0.0)[0])
         ahead = np.mod(sense * (self.begin - start), span)
         passed = ahead + span * np.floor((gone - ahead) / span)
-        time, before = (course.at(max(at, 0.0), course.time) for at in (passed, passed - span))
+        time, before = (course.when(max(at, 0.0)) for at in (passed, passed - span))
         self.way, self.takes = sense * span, time - before
         rows, which = solution.at(np.array([time]))
         self.row, self.snapshot = rows[:, 0], self._from(solution.stretches[which[0]].snapshot, time)
@@ -300,12 +292,13 @@ class Section:
             self.motion.begin(self.snapshot)
             duration = longer * self.takes
             solution = integration_of(self.motion, self.rates, self.places, duration, self.tolerance).run(row)
-            course = DriveCourse.of(self.motion, solution, self.first)
-            gone = np.sign(self.way) * (course.coordinate - self.begin).ravel()
-            if np.any(np.diff(gone) < -BACKWARD) or not len(solution.stretches):
+            if not solution.end > 0.0:
                 return None
-            if gone[-1] >= abs(self.way):
-                period = course.at(abs(self.way), course.time)
+            course = DriveCourse.of(self.motion, solution, self.first)
+            if course.sense != np.sign(self.way) or np.any(np.diff(course.gone) < -BACKWARD):
+                return None
+            if course.travel >= abs(self.way):
+                period = course.when(abs(self.way))
                 miss = solution.at(np.array([period]))[0][self.which, 0] - state
                 miss[self.turning] = np.mod(miss[self.turning] + np.pi, TURN) - np.pi
                 return miss / self.scale, _until(solution, period)
@@ -379,8 +372,8 @@ def _figures(motion: FreeMotion, cycle: SteadyCycle, repeated: Repeated, missing
     """What is said of a steady cycle before what is said of any cycle."""
     name, mean = motion.names[cycle.first], abs(repeated.advance) / repeated.period
     course = DriveCourse.of(motion, cycle.solution, cycle.first)
-    speed, subject = np.abs(course.speed), f"speed of {name}"
-    most, least = course.largest(speed), -course.largest(-speed)
+    subject = f"speed of {name}"
+    least, most = sorted((abs(course.largest(SPEED)), abs(course.largest(SPEED, -1.0))))
     return [
         Figure("cycle_time", "time of the cycle", repeated.period, "s"),
         Figure(f"{name}.speed_mean", subject, mean, "rad/s", "mean"),

@@ -18,12 +18,12 @@ import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, NoReturn, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal, single
+from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import ORIGIN, Frame, moment_at, slid
@@ -109,12 +109,13 @@ class Contact(ABC):
     parameters: Mapping[str, float]
 
     @abstractmethod
-    def state(self, walk: Forward) -> ContactState:
-        """Where the surfaces are."""
+    def state(self, walk: Forward, in_time: bool = False) -> ContactState:
+        """Where the surfaces are. in_time: numbers are dual, with their derivatives by time; in the plane alone."""
 
-    @abstractmethod
     def accelerations(self, walk: Forward) -> tuple[Array, Array]:
         """Second derivative of the gap, and derivative of the slip, m/s²."""
+        state = self.state(walk, in_time=True)
+        return derivative(state.rate), derivative(state.slip)
 
     @property
     def rigid(self) -> bool:
@@ -167,41 +168,27 @@ class PinContact(Contact):
     hole: tuple[float, float] = (0.0, 0.0)
     wall: float = 0.0
 
-    def state(self, walk: Forward) -> ContactState:
+    def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is ρ − |c|."""
-        a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
+        a, b = (_point(walk, *at, in_time) for at in ((self.body, self.pin), (self.other, self.hole)))
         cx, cy = a[0] - b[0], a[1] - b[1]
         xp = namespace(cx, cy)
         size = xp.hypot(cx, cy)
         off_centre = size > CENTRED * self.clearance
-        size_there = xp.where(off_centre, size, 1.0)
-        nx, ny = xp.where(off_centre, cx / size_there, 1.0), xp.where(off_centre, cy / size_there, 0.0)
+        over = xp.where(off_centre, size, 1.0)
+        nx, ny = xp.where(off_centre, cx / over, 1.0), xp.where(off_centre, cy / over, 0.0)
         ux, uy = a[2] - b[2], a[3] - b[3]
         tx, ty = -ny, nx
         px, py = b[0] + self.wall * nx, b[1] + self.wall * ny
-        spins = [primal(walk.motions[link].twist.w) for link in (self.body, self.other)]
+        pin, hole = (_spin(walk, link, in_time) for link in (self.body, self.other))
         # velocities of both materials where they touch, along the tangent
         slip = (
-            (a[2] * tx + a[3] * ty + spins[0] * ((px - a[0]) * nx + (py - a[1]) * ny))
-            - (b[2] * tx + b[3] * ty + spins[1] * ((px - b[0]) * nx + (py - b[1]) * ny))
+            (a[2] * tx + a[3] * ty + pin * ((px - a[0]) * nx + (py - a[1]) * ny))
+            - (b[2] * tx + b[3] * ty + hole * ((px - b[0]) * nx + (py - b[1]) * ny))
         )  # fmt: skip
         frame = walk.motions[self.other].frame
         offset = frame.c * cx + frame.s * cy, frame.c * cy - frame.s * cx
         return ContactState(self.clearance - size, -(nx * ux + ny * uy), slip, (nx, ny), (tx, ty), (px, py), offset)
-
-    def accelerations(self, walk: Forward) -> tuple[Array, Array]:
-        """Of ρ − |c|, and of the slip c·t + ω_pin (R − |c|) − ω_hole R."""
-        a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
-        cx, cy, ux, uy = (p - other for p, other in zip(a, b, strict=True))
-        far, first = _acceleration(walk, self.body, self.pin), _acceleration(walk, self.other, self.hole)
-        ax, ay = far[0] - first[0], far[1] - first[1]
-        size = namespace(cx, cy).hypot(cx, cy)
-        nx, ny = cx / size, cy / size
-        away, along = ux * nx + uy * ny, uy * nx - ux * ny
-        spin = primal(walk.motions[self.body].twist.w)
-        pin, hole = (primal(walk.motions[link].acceleration.w) for link in (self.body, self.other))
-        slip = ay * nx - ax * ny - along * away / size + pin * (self.wall - size) - spin * away - hole * self.wall
-        return -(ax * nx + ay * ny) - along * along / size, slip
 
 
 @dataclass(frozen=True)
@@ -222,62 +209,44 @@ class EdgeContact(Contact):
         """Of two corners it is one."""
         return f"{self.joint}{self.side:+.0f}"
 
-    def state(self, walk: Forward) -> ContactState:
+    def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is the distance of the wall less that of the corner, on its side of the middle."""
         x, y, c, s = self.line
-        a, frame = _point(walk, self.body, self.corner), walk.motions[self.other].frame
-        tx, ty = (primal(part) for part in walk.algebra.rotated(frame, (c, s)))
-        nx, ny = -self.side * ty, self.side * tx
-        origin = _point(walk, self.other, (x, y))
-        away = (a[0] - origin[0]) * nx + (a[1] - origin[1]) * ny
-        spin = primal(walk.motions[self.other].twist.w)
-        vx = a[2] - (origin[2] - spin * (a[1] - origin[1]))
-        vy = a[3] - (origin[3] + spin * (a[0] - origin[0]))
+        a, o = (_point(walk, *at, in_time) for at in ((self.body, self.corner), (self.other, (x, y))))
+        spin = _spin(walk, self.other, in_time)
+        tx, ty = (primal(part) for part in walk.algebra.rotated(walk.motions[self.other].frame, (c, s)))
+        if in_time:
+            tx, ty = Dual(tx, -primal(spin) * ty), Dual(ty, primal(spin) * tx)
+        nx, ny, rx, ry = -self.side * ty, self.side * tx, a[0] - o[0], a[1] - o[1]
+        away = rx * nx + ry * ny
+        vx, vy = a[2] - (o[2] - spin * ry), a[3] - (o[3] + spin * rx)
         nil = 0.0 * away
         return ContactState(
             self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + nil, ny + nil), (tx + nil, ty + nil),
-            (a[0], a[1]), ((a[0] - origin[0]) * tx + (a[1] - origin[1]) * ty, self.side * away),
+            (a[0], a[1]), (rx * tx + ry * ty, self.side * away),
         )  # fmt: skip
 
-    def accelerations(self, walk: Forward) -> tuple[Array, Array]:
-        """Across and along the guide, of the corner against the guide's link."""
-        x, y, c, s = self.line
-        frame, motion = walk.motions[self.other].frame, walk.motions[self.other]
-        tx, ty = (primal(part) for part in walk.algebra.rotated(frame, (c, s)))
-        a, o = _point(walk, self.body, self.corner), _point(walk, self.other, (x, y))
-        far, first = _acceleration(walk, self.body, self.corner), _acceleration(walk, self.other, (x, y))
-        spin, faster = primal(motion.twist.w), primal(motion.acceleration.w)
-        rx, ry, ux, uy = (p - q for p, q in zip(a, o, strict=True))
-        ux, uy = ux + spin * ry, uy - spin * rx  # against the guide
-        ax = far[0] - first[0] + faster * ry + 2 * spin * uy + spin * spin * rx
-        ay = far[1] - first[1] - faster * rx - 2 * spin * ux + spin * spin * ry
-        return -self.side * (ay * tx - ax * ty), ax * tx + ay * ty
 
-
-def _acceleration(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Any, Any]:
-    """Acceleration of a point of a link, m/s²."""
-    x, y = (primal(part) for part in walk.at(link, local).acceleration[:2])
-    return x, y
-
-
-def _point(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Number, Number, Number, Number]:
-    """Place, m, and velocity, m/s, of a point of a link."""
+def _point(walk: Forward, link: str, local: tuple[float, float], in_time: bool) -> tuple[Number, ...]:
+    """Place, m, and velocity, m/s, of a point of a link; in time with their derivatives."""
     at = walk.at(link, local)
-    x, y, vx, vy = (primal(part) for part in (*at.place[:2], *at.velocity[:2]))
-    return x, y, vx, vy
+    x, y, vx, vy, ax, ay = (primal(part) for vector in at for part in vector[:2])
+    return (Dual(x, vx), Dual(y, vy), Dual(vx, ax), Dual(vy, ay)) if in_time else (x, y, vx, vy)
+
+
+def _spin(walk: Forward, link: str, in_time: bool) -> Number:
+    """Angular velocity of a link, rad/s; in time with its derivative."""
+    spin, change = primal(walk.motions[link].twist.w), walk.motions[link].acceleration.w
+    return Dual(spin, primal(change)) if in_time else spin
 
 
 @dataclass(frozen=True)
 class SpatialContact(Contact):
-    """A contact of a pin in a hole in space. axle: the pin's frame on its link, z its axis; hole: of the hole, at the
-    middle or an end, on its own link."""
+    """A contact of a pin in a hole in space, of bodies that give. axle: the pin's frame on its link, z its axis; hole:
+    of the hole, at the middle or an end, on its own link."""
 
     axle: Frame = ORIGIN
     hole: Frame = ORIGIN
-
-    def accelerations(self, walk: Forward) -> NoReturn:
-        """Impacts of rigid bodies are of planar joints: the model's checks refuse others."""
-        raise NotImplementedError
 
     def _axes(self, walk: Forward) -> tuple[Frame, Frame]:
         """Global frames of pin and hole."""
@@ -300,7 +269,7 @@ class DiscContact(SpatialContact):
     bored = True
     wall: float = 0.0
 
-    def state(self, walk: Forward) -> ContactState:
+    def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is ρ − |c|, c from the centre of the hole's end to the pin's axis at right angles to that."""
         pin, end = self._axes(walk)
         apart = minus(pin.place, end.place)
@@ -332,7 +301,7 @@ class ShoulderContact(SpatialContact):
 
     side: float = 1.0
 
-    def state(self, walk: Forward) -> ContactState:
+    def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is half the end float less how far the pin has come along the hole's axis, to this side."""
         pin, middle = self._axes(walk)
         apart, normal = minus(pin.place, middle.place), scaled(self.side, middle.z)

@@ -26,7 +26,7 @@ from pythonfmu3 import (
 )  # fmt: skip
 
 from trunnion.dynamics.continued import Continued
-from trunnion.dynamics.filling import Books
+from trunnion.dynamics.result import Books
 from trunnion.errors import MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import read_mechanism

@@ -488,7 +488,7 @@ _DYNAMICS = (
 _STICKING = (
     Fault(
         "shares-beyond-their-end",
-        "dynamics/active.py",
+        "dynamics/active_motion.py",
         "if most > 1.0 + SLACK or",
         "if most > 1.5 + SLACK or",
         ("tests/reference/test_joints_that_lock.py", "-k", "blocks"),
@@ -513,8 +513,8 @@ _CONTACT = (
     Fault(
         "slip-without-the-spin-of-the-pin",
         "dynamics/touching.py",
-        "a[2] * tx + a[3] * ty + spins[0] *",
-        "a[2] * tx + a[3] * ty + 0.0 * spins[0] *",
+        "a[2] * tx + a[3] * ty + pin *",
+        "a[2] * tx + a[3] * ty + 0.0 * pin *",
         ("tests/reference/test_contacts.py", "-k", "friction"),
     ),
     Fault(

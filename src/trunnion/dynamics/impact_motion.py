@@ -9,7 +9,7 @@ Several places may strike at once. Impulses Λ at them change the rates of gaps 
 G = W M⁻¹ Wᵀ. At every place either nothing is exchanged and γₙ⁺ ≥ −e γₙ⁻, or γₙ⁺ = −e γₙ⁻ with an impulse Λₙ ≥ 0 and
 one along the tangent, |Λₜ| ≤ f Λₙ, that is −f Λₙ times the sign of the slip γₜ⁺: a linear complementarity problem (Ch.
 Glocker, F. Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley, 1996; without tangential restitution). Its
-cases change by the worst place first, see `active.settled`.
+cases change by the worst place first, see `active_motion.settled`.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import single
-from trunnion.dynamics.active import MEET as SLOW
-from trunnion.dynamics.active import RowMode, RowModes, settled
-from trunnion.dynamics.active_motion import ActiveMotion, OpenContact
+from trunnion.dynamics.active_motion import MEET as SLOW
+from trunnion.dynamics.active_motion import ActiveMotion, OpenContact, RowMode, RowModes, settled
 from trunnion.dynamics.bordered import nearest
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics

@@ -18,6 +18,9 @@ __all__ = ["Drive", "applied_to", "drives", "switched"]
 Array = NDArray[np.float64]
 
 CARRIED = Motor(kind="constant")  # stands for what comes through a clutch that slips
+STATED = (
+    "ratio", "efficiency", "inertia", "off_from", "brake", "brake_from", "clutch", "clutch_from", "clutch_until"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -156,19 +159,15 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
         if not driver.found:
             continue
         motor, path = driver.motor, f"drivers.{name}.motor."
-        applied = number(values.get(applied_to(name), 0.0))
-        if motor is None:
-            by_driver[name] = Drive(None, {}, applied=applied)
-            continue
-        own_parameters = {
+        parameters: dict[str, Any] = {
             key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)
         }
-        parameters: dict[str, Any] = {"integral": 0.0, **own_parameters, "over": motor.over}
-        for key in ("place", "effort"):
-            parameters[f"points.{key}"] = [own_parameters[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
-        keys = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
-                 "clutch", "clutch_from", "clutch_until")  # fmt: skip
-        by_driver[name] = Drive(
-            motor, parameters, applied=applied, **{key: own_parameters[key] for key in keys if key in own_parameters}
-        )
+        stated = {key: parameters[key] for key in STATED if key in parameters}
+        if motor is not None:
+            parameters = {"integral": 0.0, **parameters, "over": motor.over}
+            for key in ("place", "effort"):
+                numbers = [parameters[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
+                parameters[f"points.{key}"] = numbers
+        applied = number(values.get(applied_to(name), 0.0))
+        by_driver[name] = Drive(motor, parameters, applied=applied, **stated)
     return by_driver

@@ -198,16 +198,16 @@ def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, f
     What they are stated to do otherwise is next to nothing, in the time of one cycle: it chooses the assembly there.
     """
     size, duration = single(run.system.size(run.values)), run.cycle.duration or 1.0
-    drivers_made: dict[str, dict[str, Any]] = {}
-    for name, (coordinate, rate) in coordinates.items():
-        span = SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size)
-        drivers_made[name] = {
+    spans = {name: SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size) for name in coordinates}
+    return {
+        name: {
             "free": True,
-            "speed": span / duration,
-            "range": [coordinate, coordinate + span],
+            "speed": spans[name] / duration,
+            "range": [coordinate, coordinate + spans[name]],
             "initial": {"coordinate": coordinate, "speed": rate},
         }
-    return drivers_made
+        for name, (coordinate, rate) in coordinates.items()
+    }
 
 
 # ---- chains ---------------------------------------------------------------------------------------------------

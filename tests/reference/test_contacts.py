@@ -125,9 +125,7 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
         rng = np.random.default_rng(3)
         for _ in range(5):
             state = row + 1e-3 * rng.standard_normal(len(row))
-            onsets = tuple(
-                float(speed) if rng.random() < 0.5 else None for speed in rng.random(len(motion.contacts.each))
-            )
+            onsets = tuple(float(speed) if rng.random() < 0.5 else None for speed in rng.random(len(motion.contacts)))
             senses = tuple(int(one) for one in rng.choice((-1, 1), len(motion.resisted)))
             at = Layout.of(motion).moment(np.array([1e-4]), state[:, None])._replace(onsets=onsets, senses=senses)
             one, other = compiled(at), Walks(motion)(at)

@@ -32,7 +32,7 @@ from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seen, kinetic_energy
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch, over_steps, step_nodes
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
-from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset
+from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset, least_clearance
 
 __all__ = ["ActiveMotion", "ActiveSet", "OpenContact", "RowMode", "RowModes", "settled"]
 
@@ -151,7 +151,7 @@ class ActiveSet:
 
         choices: list[RowModes] = [(0, 1, -1)] * len(may)
         for k, sense in contacts.items():
-            sticky = self.motion.contacts.each[k].coefficient > 0.0
+            sticky = self.motion.contacts[k].coefficient > 0.0
             choices.append((sense or 1, None) if sense or not sticky else (0, 1, -1, None))
         modes = settled(start, objections, choices)
         return None if modes is None else moment(modes)
@@ -186,7 +186,7 @@ class ActiveSet:
 
     def _alike(self, at: Moment) -> bool:
         """Whether what lies on one wall sticks or slips as one."""
-        each = self.motion.contacts.each
+        each = self.motion.contacts
         senses = {(each[k].surface, onset.sense) for k, onset in enumerate(at.onsets) if isinstance(onset, Closed)}
         return len(senses) == len({surface for surface, _ in senses})
 
@@ -198,7 +198,7 @@ class ActiveSet:
         pull = self.motion.size * small * self.motion.pace**2
         force, worst = TINY * self.motion.force, list[tuple[float, int, RowMode]]()
         for k, before in contacts.items():
-            contact, onset = self.motion.contacts.each[k], answer.onsets[k]
+            contact, onset = self.motion.contacts[k], answer.onsets[k]
             gap, slip = (single(part) for part in contact.accelerations(answer.back.walk))
             if not isinstance(onset, Closed):
                 worst.append((-gap / pull, k, before))
@@ -212,9 +212,9 @@ class ActiveSet:
         missed, k, mode = max(worst, key=lambda miss: miss[0], default=(0.0, 0, None))
         if missed <= 1.0:
             return {}
-        wall = self.motion.contacts.each[k].surface
+        wall = self.motion.contacts[k].surface
         alike = [other for other in contacts if other == k or (mode is not None and at.onsets[other] is not None
-                 and self.motion.contacts.each[other].surface == wall)]  # fmt: skip
+                 and self.motion.contacts[other].surface == wall)]  # fmt: skip
         return dict.fromkeys(alike, mode)
 
     # ---- what locks -------------------------------------------------------------------------------------------
@@ -299,7 +299,7 @@ class ActiveMotion(Integration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.count = self.rows = len(self.motion.contacts.each)  # rows of `_gaps`
+        self.count = self.rows = len(self.motion.contacts)  # rows of `_gaps`
         self.mode = self.mode._replace(onsets=(None,) * self.count)
         self._open: dict[int, OpenContact] = {}
         self._crossed: int | None = None  # joint that has changed
@@ -407,10 +407,10 @@ class ActiveMotion(Integration):
             onsets[k] = None
             self._end(k, time, rate)
         self.mode = self.mode._replace(onsets=tuple(onsets))
-        return FIRST * self.motion.contacts.least_clearance / max(abs(rate), SLOWEST)
+        return FIRST * least_clearance(self.motion.contacts) / max(abs(rate), SLOWEST)
 
     def _say(self, time: float, kind: str, k: int, figure: float) -> None:
-        self.solution.events.append(Event(time, kind, self.motion.contacts.labels[k], figure, "m/s"))
+        self.solution.events.append(Event(time, kind, self.motion.contacts[k].label, figure, "m/s"))
 
     def _end(self, k: int, time: float, rate: float) -> None:
         """A contact lifts off."""
@@ -418,7 +418,7 @@ class ActiveMotion(Integration):
         self._say(time, "lift-off", k, rate)
 
     def _impact_of(self, k: int, contact: OpenContact, end: float, rate: float) -> Impact:
-        label, figures = self.motion.contacts.labels[k], (contact.force, contact.depth, contact.wear, contact.impulse)
+        label, figures = self.motion.contacts[k].label, (contact.force, contact.depth, contact.wear, contact.impulse)
         return Impact(label, contact.begin, end, contact.approach, rate, *figures)
 
     # ---- what holds, slips and is open ------------------------------------------------------------------------
@@ -548,7 +548,7 @@ class ActiveMotion(Integration):
             opening.wear += courses.span * float(parted.mean(lambda rows: np.abs(rows[SLIP] * rows[NORMAL])))
             if np.max(numbers[NORMAL]) > (1.0 - NEARLY) * opening.force and (place := courses.extreme(_normal)):
                 opening.force = max(opening.force, place.value)
-            if self.motion.contacts.each[k].rigid:
+            if self.motion.contacts[k].rigid:
                 continue
             if np.max(-numbers[GAP]) > (1.0 - NEARLY) * opening.depth and (place := courses.extreme(_depth)):
                 opening.depth = max(opening.depth, place.value)

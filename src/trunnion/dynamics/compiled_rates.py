@@ -12,6 +12,7 @@ slide and what is switched on decides which program it is; while a joint sticks 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.motor import drives
-from trunnion.dynamics.rates import Dynamics, Layout, Rates, Seen, Walks, beside, bridged
+from trunnion.dynamics.rates import Dynamics, Layout, Rates, Seen, Walks, beside, bridged, seen
 from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
@@ -262,8 +263,8 @@ def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
     back = motion.solve(at, cast("Any", second), motion.senses(at), sliding=True)
     for settled in back.settled:
         doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
-    seen = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
-    return [*second, *beside(motion, at, second, back), *seen, doubt]
+    contacts = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
+    return [*second, *beside(motion, at, second, back), *contacts, doubt]
 
 
 def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Number]:
@@ -330,7 +331,7 @@ def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) ->
     """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0."""
     senses = motion.senses(at)
     back, driven = motion.solve(at, second, senses, sliding=True), motion.driven(at, second, senses)
-    moved = {k: motion.contacts.each[k].accelerations(back.walk) for k in active.closed}
+    moved = {k: motion.contacts[k].accelerations(back.walk) for k in active.closed}
     efforts = [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
     return [*efforts, *(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)]
 
@@ -338,9 +339,7 @@ def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) ->
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     """What `rates.Seen` has, of every contact."""
     nothing: Any = [0.0] * len(motion.names)
-    pushes = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
-    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
-    return [*(part[i] for i in range(len(Seen._fields)) for part in parts), 0.0]
+    return [*itertools.chain(*seen(motion, motion.walk(at, nothing), at.onsets)), 0.0]
 
 
 def _margins(motion: FreeMotion, at: Moment) -> list[Number]:

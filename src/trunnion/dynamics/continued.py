@@ -17,7 +17,7 @@ from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.rates import Dynamics, Walks
 from trunnion.dynamics.result import Books, filled
-from trunnion.dynamics.solution import CLOSE, Solution
+from trunnion.dynamics.solution import CLOSE
 from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.state import FreeMotion, Mode
 from trunnion.errors import Finding, MechanismError
@@ -79,11 +79,13 @@ class Continued:
         self._rates: Dynamics = Walks(self.motion)
         self._end: Books | None = None
 
+    @np.errstate(all="ignore")
     def now(self) -> Books:
         """How it is at `time`, under the present inputs."""
         if self._end is not None:
             return self._end
-        return self._books(self._moved(self.time + BRIEF * self.run.cycle.duration).solution, self.time)
+        brief = self._moved(self.time + BRIEF * self.run.cycle.duration).solution
+        return filled(self.motion, brief, np.array([self.time]))
 
     @np.errstate(all="ignore")
     def advance(self, until: float) -> Books:
@@ -95,11 +97,11 @@ class Continued:
         if solution.ended is None:
             self.time, self._row = integration.last
             self._mode, self._snapshot = integration.mode, integration.snapshot
-            return self._books(solution, self.time)
+            return filled(self.motion, solution, np.array([self.time]))
         findings = motion_findings(self.motion, solution, self.run)
         self.ended = next(finding for finding in findings if finding.code == solution.ended.code)
         self.time = solution.end if solution.stretches else self.time
-        self._end = self._books(solution, self.time)
+        self._end = filled(self.motion, solution, np.array([self.time]))
         return self._end
 
     @np.errstate(all="ignore")
@@ -116,8 +118,3 @@ class Continued:
         )
         integration.run(self._row.copy())
         return integration
-
-    @np.errstate(all="ignore")
-    def _books(self, solution: Solution, time: float) -> Books:
-        """Every variable at a time, s."""
-        return filled(self.motion, solution, np.array([time]))

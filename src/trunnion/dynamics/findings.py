@@ -59,7 +59,7 @@ def refuse_undetermined(run: Run, playing: Sequence[str] = ()) -> None:
 def refuse_massless(motion: FreeMotion, row: Array) -> None:
     """MechanismError where a force on some free coordinate would accelerate nothing: links without mass that no joint
     holds. row: the state at the start."""
-    contacts, values = motion.contacts.each, motion.values
+    contacts, values = motion.contacts, motion.values
     at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(contacts))
     matrix = motion.inertia(at)[:, :, 0] * motion.unit
     scale = np.sqrt(np.abs(np.diag(matrix)))
@@ -342,14 +342,14 @@ def _on(motion: FreeMotion, solution: Solution, last: Stretch) -> list[str]:
 
 def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:
     """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in."""
-    for contact in motion.contacts.each:
+    for contact in motion.contacts:
         depth = max((impact.depth for impact in solution.impacts if impact.label == contact.label), default=0.0)
         if depth > contact.clearance:
             what = f"{contact.label}: the surfaces sink {readable(depth, 'm')} into each other, more than the "
             what += f"clearance of {readable(contact.clearance, 'm')}; a contact law holds for small penetrations"
             where, remedy = f"joints.{contact.joint}.contact", "check the stiffness of the contact"
             yield Finding.warning("simulate.soft", where, what, remedy, depth=depth, clearance=contact.clearance)
-    for contact in {contact.joint: contact for contact in motion.contacts.each}.values():
+    for contact in {contact.joint: contact for contact in motion.contacts}.values():
         law = run.system.mechanism.effective_joints[contact.joint].contact
         returned = restitution_of(contact.factor)
         if law is not None and not law.of.rigid and abs(returned - contact.restitution) > DIFFERS:

@@ -31,7 +31,7 @@ from trunnion.dynamics.rates import Dynamics
 from trunnion.dynamics.solution import Event, Impact
 from trunnion.dynamics.start import Places, load_times
 from trunnion.dynamics.state import FreeMotion, Linear, Mode, Moment
-from trunnion.dynamics.touching import Closed, Onset
+from trunnion.dynamics.touching import Closed, Onset, least_clearance
 
 __all__ = ["OPEN", "STICK", "ImpactMotion", "Struck", "integration_of", "strike"]
 
@@ -41,6 +41,11 @@ OPEN, STICK = None, 0
 
 CLOSE = 1e-12  # of the largest speed or impulse: differences that are rounding
 HALVINGS = 60
+LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
+MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
+CROWD, CROWDED = 100, 1e-9  # events within so much of the duration: they have no end
+FLIGHT = 0.1  # of the time to the next impact: the first step after one
+STILL = 1e-12  # of the speeds of an impact: a slip that is 0
 
 
 class Struck(NamedTuple):
@@ -85,12 +90,31 @@ def _struck(delassus: Array, before: Array, restitution: Array, friction: Array)
     """The case to which no place objects; at first none exchanges anything."""
     places = len(restitution)
     back = -restitution * np.minimum(before[:places], 0.0)
+    speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
+    senses = [-1 if slip < 0.0 else 1 for slip in before[places:]]
 
     def objections(cases: RowModes) -> Mapping[int, RowMode] | None:
+        """The place that breaks its law most, and what it seems to do instead; None: the equations of a case, which
+        were singular, are not kept."""
         impulse, after = _solved(delassus, before, back, friction, cases)
-        return _objections(impulse, after, before, back, friction, cases)
+        size = CLOSE * max(float(np.max(np.abs(impulse))), 1e-300)
+        worst: list[tuple[float, int, RowMode]] = [(1.0, -1, OPEN)]
+        for k, case in enumerate(cases):
+            gap, slip = (after[k] - back[k]) / speed, after[places + k] / speed
+            normal, tangent = impulse[k], impulse[places + k]
+            if case is OPEN:
+                worst.append((-gap, k, senses[k]))
+                continue
+            if abs(gap) > 1.0 or (case == STICK and abs(slip) > 1.0):
+                return None
+            worst.append((-normal / size, k, OPEN))
+            if case == STICK:
+                worst.append(((abs(tangent) - friction[k] * normal) / size, k, -int(np.sign(tangent))))
+            elif friction[k] > 0.0:
+                worst.append((-case * slip, k, STICK))
+        _, k, mode = max(worst, key=lambda miss: miss[0])
+        return {} if k < 0 else {k: mode}
 
-    senses = _senses(before)
     choices = [(OPEN, s, STICK, -s) if f > 0.0 else (OPEN, s) for f, s in zip(friction, senses, strict=True)]
     cases = settled([OPEN] * places, objections, choices)
     if cases is None:
@@ -114,48 +138,11 @@ def _solved(delassus: Array, before: Array, back: Array, friction: Array, cases:
             targets.append(-before[places + k])
     if not unknown:
         return np.zeros(2 * places), before
-    rows, columns = np.array(unknown), spread[:, unknown]
-    matrix = delassus[rows] @ columns
-    numbers = np.linalg.lstsq(matrix, np.array(targets), rcond=1e-13)[0]  # two places may share one impulse
+    columns = spread[:, unknown]
+    # two places may share one impulse
+    numbers = np.linalg.lstsq(delassus[unknown] @ columns, np.array(targets), rcond=1e-13)[0]
     impulse: Array = columns @ numbers
     return impulse, before + delassus @ impulse
-
-
-def _senses(before: Array) -> list[int]:
-    """Of the slips before."""
-    return [-1 if slip < 0.0 else 1 for slip in before[len(before) // 2 :]]
-
-
-def _objections(
-    impulse: Array, after: Array, before: Array, back: Array, friction: Array, cases: RowModes
-) -> Mapping[int, RowMode] | None:
-    """The place that breaks its law most, and what it seems to do instead; None: the equations of a case, which were
-    singular, are not kept."""
-    places, senses = len(cases), _senses(before)
-    normal, tangent, size = impulse[:places], impulse[places:], CLOSE * max(float(np.max(np.abs(impulse))), 1e-300)
-    speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
-    worst: list[tuple[float, int, RowMode]] = [(1.0, -1, OPEN)]
-    for k, case in enumerate(cases):
-        gap, slip = (after[k] - back[k]) / speed, after[places + k] / speed
-        if case is OPEN:
-            worst.append((-gap, k, senses[k]))
-            continue
-        if abs(gap) > 1.0 or (case == STICK and abs(slip) > 1.0):
-            return None
-        worst.append((-normal[k] / size, k, OPEN))
-        if case == STICK:
-            worst.append(((abs(tangent[k]) - friction[k] * normal[k]) / size, k, -int(np.sign(tangent[k]))))
-        elif friction[k] > 0.0:
-            worst.append((-case * slip, k, STICK))
-    _, k, mode = max(worst, key=lambda miss: miss[0])
-    return {} if k < 0 else {k: mode}
-
-
-LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
-MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
-CROWD, CROWDED = 100, 1e-9  # events within so much of the duration: they have no end
-FLIGHT = 0.1  # of the time to the next impact: the first step after one
-STILL = 1e-12  # of the speeds of an impact: a slip that is 0
 
 
 @dataclass
@@ -168,13 +155,11 @@ class ImpactMotion(ActiveMotion):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.rows = 2 * self.count
-        each = self.motion.contacts.each
+        each = self.motion.contacts
         self.friction = np.array([contact.coefficient for contact in each])
         self.restitution = np.array([contact.restitution for contact in each])
-        self.meet = MEET * self.motion.contacts.least_clearance
-        self.low = np.array(
-            [max(LOW * contact.clearance, ROUNDED * self.motion.size) for contact in self.motion.contacts.each]
-        )
+        self.meet = MEET * least_clearance(self.motion.contacts)
+        self.low = np.array([max(LOW * contact.clearance, ROUNDED * self.motion.size) for contact in each])
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
@@ -201,7 +186,7 @@ class ImpactMotion(ActiveMotion):
             self._end(contact, time, 0.0)
             self._set({contact: None})
             return np.inf
-        each = self.motion.contacts.each
+        each = self.motion.contacts
         together = [other for other in self._closed() if each[other].surface == each[contact].surface]
         if onset.sense:  # the slip ends
             self._set(dict.fromkeys(together, Closed(0)))
@@ -291,7 +276,7 @@ class ImpactMotion(ActiveMotion):
         walk = self.motion.accelerate(self.moment(time, after)._replace(onsets=onsets)).back.walk
         for i, k in enumerate(places):
             speed, e = max(float(struck.after[i]), 0.0), float(self.restitution[k])
-            pull = -single(self.motion.contacts.each[k].accelerations(walk)[0])
+            pull = -single(self.motion.contacts[k].accelerations(walk)[0])
             if pull > 0.0 and e > 0.0 and k in free:
                 low = 0.5 * speed * speed / pull < self.low[k]
                 if low or i in rebounds:
@@ -318,7 +303,7 @@ class ImpactMotion(ActiveMotion):
                 if k not in closed:
                     self._end(k, time, float(struck.after[i]))
             elif case is not OPEN:
-                label, rate = self.motion.contacts.labels[k], float(struck.after[i])
+                label, rate = self.motion.contacts[k].label, float(struck.after[i])
                 self.solution.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
@@ -389,7 +374,7 @@ def integration_of(
     mode: Mode | None = None,
 ) -> Integration:  # fmt: skip
     """What integrates a motion. duration, evaluations, start, mode: see `Integration`."""
-    kind = ImpactMotion if any(contact.rigid for contact in motion.contacts.each) else ActiveMotion
+    kind = ImpactMotion if any(contact.rigid for contact in motion.contacts) else ActiveMotion
     return kind(
         motion, rates, duration, tolerance, load_places, progress, load_times(motion, duration),
         evaluations, mode or Mode(), start,

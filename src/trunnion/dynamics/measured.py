@@ -54,16 +54,12 @@ def courses_in_time(
     run: Run, measures: Iterable[Measure], values: Mapping[str, Number], shape: tuple[int, ...]
 ) -> dict[str, tuple[Number, ...]]:
     """Those measures that are of a motion in time, by name: one number a sample, to broadcast to the shape."""
-    by_measure: dict[str, tuple[Number, ...]] = {}
-    by_place: dict[tuple[str, float | None], dict[str, Number]] = {}
-    for measure in measures:
-        if not measure.in_time:
-            continue
-        motion = measure.subject, measure.duration
-        if motion not in by_place:
-            by_place[motion] = numbers_in_time(run, *motion, values, shape)
-        by_measure[measure.name] = (by_place[motion][measure.kind],)
-    return by_measure
+    in_time = [measure for measure in measures if measure.in_time]
+    motions = {
+        motion: numbers_in_time(run, *motion, values, shape)
+        for motion in dict.fromkeys((measure.subject, measure.duration) for measure in in_time)
+    }
+    return {measure.name: (motions[measure.subject, measure.duration][measure.kind],) for measure in in_time}
 
 
 @np.errstate(all="ignore")
@@ -109,8 +105,7 @@ def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, dura
         return figures_in_time(run, driver, values, count, duration)
     stored: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
     numbers = tuple((path, np.asarray(value, float).tobytes()) for path, value in values.items())
-    what = driver, duration, count, numbers
-    if what not in stored:
+    if (what := (driver, duration, count, numbers)) not in stored:
         if len(stored) >= KEPT:
             stored.clear()
         stored[what] = figures_in_time(run, driver, values, count, duration)

@@ -12,15 +12,27 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
-from trunnion.dynamics.touching import Closed, Contacts
+from trunnion.dynamics.touching import Closed, Contact, Onset, pushes_of
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.system import felt, law_of, law_parameters
 from trunnion.solve.track import carried_on
 
 __all__ = [
-    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "bridged", "kinetic_energy",
-    "potential_energy", "works_of",
+    "CLUTCH",
+    "CONTACT",
+    "WORKS",
+    "Dynamics",
+    "Layout",
+    "Rates",
+    "Seen",
+    "Walks",
+    "beside",
+    "bridged",
+    "kinetic_energy",
+    "potential_energy",
+    "seen",
+    "works_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -80,7 +92,7 @@ class Layout(NamedTuple):
     def of(cls, motion: FreeMotion) -> Layout:
         """The row of a free motion."""
         clutched = any(drive.clutched for drive in motion.drives.values())
-        return cls(len(motion.names), len(motion.bristles), bool(motion.contacts.each), clutched)
+        return cls(len(motion.names), len(motion.bristles), bool(motion.contacts), clutched)
 
     @property
     def works_named(self) -> tuple[str, ...]:
@@ -152,9 +164,15 @@ class Walks:
             walk, onsets = accelerated.back.walk, accelerated.onsets
         else:
             walk = motion.walk(at, np.zeros_like(at.q))
-        parts = [(state.gap, state.rate, state.slip, push.normal, push.friction)
-                 for state, push in motion.contacts.pushes(walk, onsets)]  # fmt: skip
-        return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
+        rows = seen(motion, walk, onsets)
+        return Seen(*(np.array([np.broadcast_to(number, lanes) for number in row]) for row in rows))
+
+
+def seen(motion: FreeMotion, walk: Forward, onsets: Sequence[Onset]) -> list[list[Number]]:
+    """The rows of `Seen`, of every contact."""
+    pushes = pushes_of(motion.contacts, walk, onsets)
+    states = [[state.gap, state.rate, state.slip, push.normal, push.friction] for state, push in pushes]
+    return [[numbers[i] for numbers in states] for i in range(len(Seen._fields))]
 
 
 WIDTH = 0.02  # rad, or of the size: from a change point to the first place at which rates are asked for
@@ -239,7 +257,7 @@ def beside(motion: FreeMotion, at: Moment, second: Sequence[Number] | Array, bac
     return [*errors, *bristles, *slips, *works, *lost]
 
 
-def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
+def works_of(back: Backward, at: Moment, contacts: Sequence[Contact]) -> list[Number]:
     """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
     loads = back.walk.system.mechanism.loads
     powers: list[Number] = [
@@ -248,8 +266,8 @@ def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
         sum((state.power for state in back.springs.values()), 0.0),
         sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
     ]
-    if contacts.each:
-        powers.append(sum((push.loss for _, push in contacts.pushes(back.walk, at.onsets)), 0.0))
+    if contacts:
+        powers.append(sum((push.loss for _, push in pushes_of(contacts, back.walk, at.onsets)), 0.0))
     return powers
 
 

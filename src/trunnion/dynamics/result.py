@@ -32,7 +32,7 @@ from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
 from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Contacts, ContactState, Push
+from trunnion.dynamics.touching import Contact, ContactState, Push, pushes_of
 from trunnion.errors import Finding, Status
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
@@ -141,7 +141,7 @@ def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened |
     system = (motion.run if stated is None else stated.run).system
     arrays, (rows, which) = fill.allocate(system, len(time)), solution.at(time)
     seconds, energies = np.full((layout.coordinates, len(time)), np.nan), np.full((2, len(time)), np.nan)
-    sizes = {"contact": len(motion.contacts.each), "axis": len(system.axes), "time": len(time)}
+    sizes = {"contact": len(motion.contacts), "axis": len(system.axes), "time": len(time)}
     contacts = {
         name: np.zeros([sizes[dim] for dim in variable.dims]) * (1 if variable.dtype is np.int8 else np.nan)
         for name, variable in CONTACT.items()
@@ -154,7 +154,7 @@ def filled(motion: FreeMotion, solution: Solution, time: Array, opened: Opened |
         accelerated = motion.accelerate(at)
         seconds[:, lanes], back = accelerated.second, accelerated.back
         energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
-        touched = motion.contacts.pushes(back.walk, accelerated.onsets)
+        touched = pushes_of(motion.contacts, back.walk, accelerated.onsets)
         for k, ((state, push), onset) in enumerate(zip(touched, accelerated.onsets, strict=True)):
             numbers = state.gap, push.normal, push.friction, state.slip, float(onset is not None)
             for name, number in zip(CONTACT, numbers, strict=False):
@@ -197,7 +197,7 @@ def _alike(solution: Solution, which: NDArray[np.intp]) -> Iterator[tuple[NDArra
 class Stated:
     """A motion whose joints in play were taken out, as one of the mechanism that was stated."""
 
-    def __init__(self, opened: Opened, contacts: Contacts) -> None:
+    def __init__(self, opened: Opened, contacts: Sequence[Contact]) -> None:
         self.run, self.parts, self.contacts = opened.run, opened.parts, contacts
         self.cut = in_play(self.run.system.mechanism)
         local, holes = self.run.system.elements(self.run.values), self.run.system.holes(self.run.values)
@@ -217,7 +217,7 @@ class Stated:
         for joint in joints:
             reaction = back.reactions[self.parts[joint][-1]] if joint in self.parts else zero
             second = system.joints[joint][1][1]
-            for contact, (state, push) in zip(self.contacts.each, touched, strict=True):
+            for contact, (state, push) in zip(self.contacts, touched, strict=True):
                 if contact.joint == joint:
                     along = push._replace(normal=0.0 * push.normal)
                     reaction = walk.algebra.added(reaction, dict(contact.action(back.walk, state, push).on)[second])
@@ -243,7 +243,7 @@ class Stated:
             row = list(self.run.system.joints).index(joint)
             arrays["friction_power"][row, window] = -sum(
                 push.friction * state.slip
-                for contact, (state, push) in zip(self.contacts.each, touched, strict=True)
+                for contact, (state, push) in zip(self.contacts, touched, strict=True)
                 if contact.joint == joint
             )
             if isinstance(walk, SpatialWalk):
@@ -339,6 +339,11 @@ class Found(NamedTuple):
         return cls(solution, between(time), Course.of(run, solution, between))
 
     @property
+    def exhausted(self) -> bool:
+        """Whether it ended because its evaluations were used up."""
+        return self.solution.ended is not None and self.solution.ended.code == "simulate.evaluations"
+
+    @property
     def share(self) -> float:
         """What works and energies differ by at most, of the energy turned over; 0 where it is rounding."""
         if self.course is None or not self.course.worst > ROUNDING * self.course.stored:
@@ -359,7 +364,7 @@ def _residual(works: Array, energies: Array) -> Array:
 
 def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) -> Result:
     """The result of a motion in time. run: of the mechanism as it was stated, its joints in play included."""
-    solution, books, contacts = integrated.solution, integrated.books, motion.contacts.each
+    solution, books, contacts = integrated.solution, integrated.books, motion.contacts
     mechanism, system = run.system.mechanism, run.system
     for time, kind, of, effort in switched(motion.drives, solution.end):
         unit = "" if np.isnan(effort) else "N m" if motion.system.turns(of) else "N"
@@ -396,7 +401,7 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) 
         parts |= described(_beside(motion, run, solution, books), MOTION, units)
         along, coordinates = {"time": Variable(("time",), "s", "time from the start")}, {"time": books.time}
         if contacts:
-            labels["contact"] = list(motion.contacts.labels)
+            labels["contact"] = [contact.label for contact in motion.contacts]
             parts |= described(books.contacts, CONTACT)
             impacts = {name: [getattr(impact, name.removeprefix("impact_")) for impact in solution.impacts]
                        for name in IMPACT}  # fmt: skip
@@ -485,7 +490,7 @@ def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) ->
             if value > 0:
                 subject, when = f"reaction in {joint}", f"at {time:.4g} s"
                 figures.append(Figure(f"{joint}.reaction_max", subject, value, "N", "largest", when))
-    figures += _impact_figures(motion.contacts.labels, solution.impacts, solution.end)
+    figures += _impact_figures([contact.label for contact in motion.contacts], solution.impacts, solution.end)
     for key, work in zip(solution.layout.works_named, course.last.works, strict=True):
         if abs(work[0]) > scales.floor("J"):
             figures.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))

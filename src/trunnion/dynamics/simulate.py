@@ -18,7 +18,7 @@ from trunnion.dynamics.result import Found, filled, result_of
 from trunnion.dynamics.start import CYCLES, initial_row, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.steady_cycle import steady as steady_result
-from trunnion.dynamics.touching import contacts_of
+from trunnion.dynamics.touching import contacts_of, least_clearance
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
 ACCOUNT, MISSED = 1e-8, 10.0  # what the energy account may miss, of the energy turned over; times the tolerance
-HELPS = 0.3  # of what the account missed: a finer motion that misses more is the last
 FINER = 2  # motions with a tenth of the tolerance of the last, at most, that are tried where it misses more
 
 
@@ -114,7 +113,7 @@ def simulated(
         loose, contacts = prepare(bare.mechanism, free=True), contacts_of(run, playing)
         refuse_undetermined(loose, playing)
         motion = FreeMotion.of(loose, contacts)
-        tolerance *= min(1.0, contacts.least_clearance / single(run.system.size(run.values)))
+        tolerance *= min(1.0, least_clearance(contacts) / single(run.system.size(run.values)))
         tolerance = max(tolerance, FINEST)
     load_places, row, rates = places(motion, mechanism.drivers), initial_row(motion), rates_of(motion)
     check_start(motion, row, load_places.limits)
@@ -140,31 +139,23 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
     best, most = find(tolerance), max(ACCOUNT, MISSED * tolerance)
     for _ in range(FINER):
         tolerance = max(0.1 * tolerance, FINEST)
-        if not best.share > most or _exhausted(best):
+        if best.exhausted or not best.share > most:
             break
-        other = find(tolerance)
-        if _exhausted(other) or not other.share < best.share:
+        finer = find(tolerance)
+        if finer.exhausted or not finer.share < best.share:
             break
-        helps, best = other.share < HELPS * best.share, other
-        if not helps:
-            break
+        best = finer
     return best
-
-
-def _exhausted(integrated: Found) -> bool:
-    return integrated.solution.ended is not None and integrated.solution.ended.code == "simulate.evaluations"
 
 
 def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: int) -> None:
     """MechanismError for numbers that make no sense."""
-    findings = []
-    if not (np.isfinite(duration) and duration > 0):
-        findings.append(Finding(f"a duration of {duration:g} s", "duration", "give a time above 0, such as 2 s"))
-    if not 1 <= steps <= MOST_STEPS:
-        findings.append(Finding(f"cannot give {steps} steps", "steps", f"give a whole number from 1 to {MOST_STEPS:,}"))
-    if evaluations < 1:
-        findings.append(Finding(f"cannot do {evaluations} evaluations", "evaluations", "give a whole number from 1"))
-    if not 1e-13 <= tolerance <= 1e-2:
-        findings.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))
-    if findings:
-        raise MechanismError(findings)
+    checks = {
+        "duration": (np.isfinite(duration) and duration > 0, duration, "a time above 0, such as 2 s"),
+        "steps": (1 <= steps <= MOST_STEPS, steps, f"a whole number from 1 to {MOST_STEPS:,}"),
+        "evaluations": (evaluations >= 1, evaluations, "a whole number from 1"),
+        "tolerance": (1e-13 <= tolerance <= 1e-2, tolerance, "a number from 1e-13 to 1e-2"),
+    }
+    wrong = [(key, number, form) for key, (right, number, form) in checks.items() if not right]
+    if wrong:
+        raise MechanismError(Finding(f"{key} cannot be {number:g}", key, f"give {form}") for key, number, form in wrong)

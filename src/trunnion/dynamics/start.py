@@ -83,7 +83,7 @@ def places(motion: FreeMotion, drivers: Collection[str] | None = None) -> Places
             if None not in ends and (drivers is None or name in drivers):
                 limits[name] = min(map(single, ends)), max(map(single, ends))
         return Places(limits=limits)
-    run, cycle, (name,) = motion.run, motion.cycle, motion.names
+    run, cycle, (name,) = motion.run, motion.run.cycle, motion.names
     nominal = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(run.values, name))
     begin, speed = single(nominal.value), single(nominal.rate)
     meetings = [

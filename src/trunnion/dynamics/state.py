@@ -23,13 +23,13 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.bordered import RANK, nearest, newton_step
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
-from trunnion.dynamics.touching import Closed, Contacts, Onset
+from trunnion.dynamics.touching import Closed, Contact, Onset, actions_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
+from trunnion.solve.system import System, Values, felt, freed, law_of, rubbing, sticking
 
 __all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Mode", "Moment", "repeated"]
 
@@ -131,11 +131,11 @@ class FreeMotion:
     drives: Mapping[str, Drive]
     assembly: Assembly
     method: FrictionMethod = field(default_factory=FrictionMethod)
-    contacts: Contacts = field(default_factory=Contacts)
+    contacts: tuple[Contact, ...] = ()
     walked: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
 
     @classmethod
-    def of(cls, run: Run, contacts: Contacts | None = None) -> Self:
+    def of(cls, run: Run, contacts: tuple[Contact, ...] = ()) -> Self:
         """The free motion of a prepared mechanism.
 
         Raises MechanismError where the links do not come back with the drivers, as of a nut, and no range says how far
@@ -146,7 +146,7 @@ class FreeMotion:
             where, remedy = next(iter(run.system.mechanism.drivers)), "state how far it goes: range: [0 turn, 20 turn]"
             raise MechanismError(Finding(what, f"drivers.{where}.range", remedy))
         free = drives(run.system, run.values)
-        return cls(run, free, follows(run, len(free) > 1), contacts=contacts or Contacts())
+        return cls(run, free, follows(run, len(free) > 1), contacts=contacts)
 
     @property
     def system(self) -> System:
@@ -155,10 +155,6 @@ class FreeMotion:
     @property
     def values(self) -> Values:
         return self.run.values
-
-    @property
-    def cycle(self) -> Cycle:
-        return self.run.cycle
 
     @cached_property
     def size(self) -> float:
@@ -291,7 +287,7 @@ class FreeMotion:
         given_state = Given(
             senses,
             dict(zip(self.bristles, at.bristles, strict=True)),
-            acting=(lambda walk: self.contacts.actions(walk, at.onsets)) if touches else None,
+            acting=(lambda walk: actions_of(self.contacts, walk, at.onsets)) if touches else None,
             sliding=sliding and not self.rests(at),
             rests=dict(zip(self.resisted, (sense == 0 for sense in at.senses), strict=False)) if self.several else {},
         )
@@ -443,7 +439,7 @@ class FreeMotion:
     def held(self, at: Moment) -> Held:
         """The rows that hold."""
         closed = [k for k, onset in enumerate(at.onsets) if isinstance(onset, Closed)]
-        walls = {self.contacts.each[k].surface: k for k in reversed(closed) if _sticks(at.onsets[k])}
+        walls = {self.contacts[k].surface: k for k in reversed(closed) if _sticks(at.onsets[k])}
         return Held(_sticking_rows(at), closed, list(walls.values()))
 
     def _units(self, active: Held) -> tuple[Array, Array]:
@@ -470,7 +466,7 @@ class FreeMotion:
             of_rows[k] = share
         senses = self.senses(at, pattern, of_rows)
         back = self.solve(at._replace(onsets=onsets), second, senses, sliding=True)
-        moved = {k: self.contacts.each[k].accelerations(back.walk) for k in active.closed}
+        moved = {k: self.contacts[k].accelerations(back.walk) for k in active.closed}
         rows = [
             self.demanded(back, at.q.shape) - self.given(at, second, senses),
             *(moved[k][0] for k in active.closed),
@@ -575,7 +571,7 @@ class FreeMotion:
             elif _sticks(onset):  # of those that stick on one wall the first is given all
                 friction = 0.0 * forces[row]
             else:
-                friction = -self.contacts.each[k].coefficient * forces[row] * onset.sense
+                friction = -self.contacts[k].coefficient * forces[row] * onset.sense
             forced[k] = Closed(onset.sense, forces[row], friction)
         return tuple(forced)
 
@@ -583,9 +579,9 @@ class FreeMotion:
         """What holds on one wall, shared out by the normal forces."""
         shared = list(onsets)
         for first in walls:
-            surface = self.contacts.each[first].surface
+            surface = self.contacts[first].surface
             forces = {k: onset for k, onset in enumerate(onsets) if isinstance(onset, Closed) and _sticks(onset)
-                      and self.contacts.each[k].surface == surface}  # fmt: skip
+                      and self.contacts[k].surface == surface}  # fmt: skip
             normal = sum(onset.normal for onset in forces.values())
             friction = sum(onset.friction for onset in forces.values())
             for k, onset in forces.items() if len(forces) > 1 else ():
@@ -594,7 +590,8 @@ class FreeMotion:
 
     def linear(self, at: Moment) -> Linear:
         """What impulses come to, at one moment: friction in other joints takes no impulses."""
-        states = self.contacts.states(self._by_rates(at))
+        walk = self._by_rates(at)
+        states = [contact.state(walk) for contact in self.contacts]
         gaps = np.array([state.gap[0] for state in states], float)
         rates = np.array([state.rate for state in states] + [state.slip for state in states], float)
         return Linear(self._mass(at), *_differences(rates), gaps)

@@ -9,7 +9,7 @@ What was found becomes the motion law of the drivers (`Repeated`), so that the c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.cycle import summary
-from trunnion.cycle.positions import Positions, positions
+from trunnion.cycle.positions import positions
 from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.followed import Snapshot
@@ -140,59 +140,76 @@ def steady(
     Positions are equally spaced in time. Raises MechanismError where a cycle cannot be asked for, UnsteadyError where
     there is none.
     """
-    if findings := list(_refused(mechanism)):
-        raise MechanismError(findings)
     motion = FreeMotion.of(prepare(mechanism))
-    if motion.several and motion.resisted:
-        what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
-        remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
-        raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])
-    found = _steady_cycle(motion, duration, tolerance, progress, evaluations)
-    each = Repeated.of(motion, found.solution)
-    laws = {name: motion_law(repeated) for name, repeated in zip(motion.names, each, strict=True)}
+    if findings := list(_refused(mechanism, motion)):
+        raise MechanismError(findings)
+    solution, first, residual, factor = _steady_cycle(motion, duration, tolerance, progress, evaluations)
+    each, name = Repeated.of(motion, solution), motion.names[first]
+    laws = {driver: motion_law(repeated) for driver, repeated in zip(motion.names, each, strict=True)}
     run = prepare(mechanism.with_motions(laws))
     at = positions(run, steps, engine="numpy")
-    cycle = summary.result_of(run, at)
-    missing = _missing(motion, found, at)
-    figures = [*_figures(motion, found, each[found.first], missing), *summary_of(cycle)]
+    cycle, notes = summary.result_of(run, at), list[Finding]()
+    # efforts of cycle and motors; a joint at rest for a moment may rub either way: such positions tell nothing
+    efforts = filled(motion, solution, at.time).arrays["drive_effort"]
+    differences = np.abs(at.arrays["drive_effort"] - efforts)[:, at.arrays["status"] == Status.SOLVED]
+    missing = float(np.nanmax(differences, initial=0.0)) / max(float(np.max(np.abs(efforts))), 1e-300)
+    if factor > 1.0 + INDIFFERENT:
+        what = f"the steady cycle is not stable: a difference from it grows by the factor {factor:.4g} with every cycle"
+        remedy = "run it without --steady to see how it leaves this cycle"
+        notes.append(Finding.warning("simulate.unstable", f"drivers.{name}", what, remedy, factor=factor))
+    if not missing <= DIFFERS:
+        what = f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} of the largest: "
+        what += "it is not the motion that was found"
+        remedy = "run it without --steady to see the motion from its start"
+        notes.append(Finding.error("simulate.cycle_differs", "", what, remedy, share=missing))
+    course, subject, period = DriveCourse.of(motion, solution, first), f"speed of {name}", each[first].period
+    least, most = sorted((abs(course.largest(SPEED)), abs(course.largest(SPEED, -1.0))))
+    mean = abs(each[first].advance) / period
+    figures = [
+        Figure("cycle_time", "time of the cycle", period, "s"),
+        Figure(f"{name}.speed_mean", subject, mean, "rad/s", "mean"),
+        Figure(f"{name}.speed_max", subject, most, "rad/s", "largest"),
+        Figure(f"{name}.speed_min", subject, least, "rad/s", "smallest"),
+        Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", (most - least) / mean, "1"),
+        Figure("decay", "what is left of a difference after a cycle", factor, "1"),
+        Figure("repeats", "by how much the end misses the begin", residual, "1", "of the state"),
+        Figure("efforts_differ", "efforts of cycle and motors, difference", missing, "1", "of the largest"),
+        *summary_of(cycle),
+    ]
     attributes = encoded({
         **cycle.attrs,
-        "findings": finding_rows([*findings_of(cycle), *_findings(motion.names[found.first], found, missing)]),
+        "findings": finding_rows([*findings_of(cycle), *notes]),
         **scales_in(cycle).summary(figures),
         "steady": 1,
     })  # fmt: skip
     return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))
 
 
-def _refused(mechanism: Mechanism) -> Iterator[Finding]:
+def _refused(mechanism: Mechanism, motion: FreeMotion) -> Iterator[Finding]:
     """What keeps a free motion from repeating itself, or from being told as a cycle."""
     values, joints = mechanism.parameters(), mechanism.effective_joints
-    timed = list[str]()  # what follows the time
+    follows = "it follows the time, and a steady cycle takes the time that it takes"
+    reasons = {f"joints.{joint}.contact": "it is in play: contacts come and go" for joint in in_play(mechanism)}
     for name, driver in mechanism.drivers.items():
         where, motor = f"drivers.{name}", driver.motor
         if not driver.found:
-            timed.append(where)
+            reasons[where] = follows
         if driver.range is not None and PAIRS[joints[name].type].turns:
-            yield Finding("it does not go round, so it has no steady cycle", f"{where}.range", "leave --steady out")
-        if motor is None:
-            continue
-        if motor.clutch is not None:
-            what = "a clutch that may slip is not solved in a steady cycle"
-            yield Finding(what, f"{where}.motor.clutch", "remove it, or leave --steady out")
-        timed += [f"{where}.motor.{key}" for key in ("off_from", "brake_from") if getattr(motor, key) is not None]
-        timed += [f"{where}.motor.over"] * (motor.over == "time")
-    for joint in in_play(mechanism):
-        what = "it is in play: a cycle knows no contacts that come and go"
-        yield Finding(what, f"joints.{joint}.contact", "leave --steady out, or remove the contact")
+            reasons[f"{where}.range"] = "it does not go round"
+        if motor is not None:
+            if motor.clutch is not None:
+                reasons[f"{where}.motor.clutch"] = "a clutch may slip"
+            timed = {"off_from": motor.off_from, "brake_from": motor.brake_from, "over": motor.over == "time" or None}
+            reasons |= {f"{where}.motor.{key}": follows for key, value in timed.items() if value is not None}
     clocks = {"time"} | {name for name, table in mechanism.tables.items() if table.over == "time"}
     for path, entry in mechanism.parameter_set.entries.items():
         if path not in values and entry.varies and clocks & set(entry.quantity.names):
-            timed.append(path)
-    for where in timed:
-        what = "it follows the time, and a steady cycle takes the time that it takes"
-        yield Finding(
-            what, where, "state it over the speed or the drive, let the driver be free, or leave --steady out"
-        )
+            reasons[path] = follows
+    if motion.several:
+        sticks = "it may stick while others slide, as several drivers are free; use laws that are smooth at rest"
+        reasons |= {f"joints.{joint}": sticks for joint in motion.resisted}
+    for where, what in reasons.items():
+        yield Finding(f"{what}: there is no steady cycle", where, "remove it, or leave --steady out")
 
 
 def _steady_cycle(
@@ -353,47 +370,3 @@ def _until(solution: Solution, time: float) -> Solution:
     """A solution up to a time."""
     stretches = [each._replace(end=min(each.end, time)) for each in solution.stretches if each.begin < time]
     return replace(solution, stretches=stretches, events=[each for each in solution.events if each.time <= time])
-
-
-# ---- what is told of it -------------------------------------------------------------------------------------------
-
-
-def _missing(motion: FreeMotion, cycle: SteadyCycle, at: Positions) -> float:
-    """By how much the efforts that the cycle takes differ from those of the motors, of the largest.
-
-    Where a joint is at rest for a moment its friction may act either way: such positions tell nothing.
-    """
-    efforts = filled(motion, cycle.solution, at.time).arrays["drive_effort"]
-    differences = np.abs(at.arrays["drive_effort"] - efforts)[:, at.arrays["status"] == Status.SOLVED]
-    return float(np.nanmax(differences, initial=0.0)) / max(float(np.max(np.abs(efforts))), 1e-300)
-
-
-def _figures(motion: FreeMotion, cycle: SteadyCycle, repeated: Repeated, missing: float) -> Sequence[Figure]:
-    """What is said of a steady cycle before what is said of any cycle."""
-    name, mean = motion.names[cycle.first], abs(repeated.advance) / repeated.period
-    course = DriveCourse.of(motion, cycle.solution, cycle.first)
-    subject = f"speed of {name}"
-    least, most = sorted((abs(course.largest(SPEED)), abs(course.largest(SPEED, -1.0))))
-    return [
-        Figure("cycle_time", "time of the cycle", repeated.period, "s"),
-        Figure(f"{name}.speed_mean", subject, mean, "rad/s", "mean"),
-        Figure(f"{name}.speed_max", subject, most, "rad/s", "largest"),
-        Figure(f"{name}.speed_min", subject, least, "rad/s", "smallest"),
-        Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", (most - least) / mean, "1"),
-        Figure("decay", "what is left of a difference after a cycle", cycle.factor, "1"),
-        Figure("repeats", "by how much the end misses the begin", cycle.residual, "1", "of the state"),
-        Figure("efforts_differ", "efforts of cycle and motors, difference", missing, "1", "of the largest"),
-    ]
-
-
-def _findings(driver: str, cycle: SteadyCycle, missing: float) -> Iterator[Finding]:
-    if cycle.factor > 1.0 + INDIFFERENT:
-        what = f"the steady cycle is not stable: a difference from it grows by the factor {cycle.factor:.4g} with "
-        what += "every cycle"
-        remedy = "run it without --steady to see how it leaves this cycle"
-        yield Finding.warning("simulate.unstable", f"drivers.{driver}", what, remedy, factor=cycle.factor)
-    if not missing <= DIFFERS:
-        what = f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} of the largest: "
-        what += "it is not the motion that was found"
-        remedy = "run it without --steady to see the motion from its start"
-        yield Finding.error("simulate.cycle_differs", "", what, remedy, share=missing)

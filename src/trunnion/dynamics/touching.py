@@ -17,7 +17,7 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -38,8 +38,8 @@ from trunnion.solve.run import Run
 from trunnion.solve.system import law_parameters
 
 __all__ = [
-    "Closed", "Contact", "ContactState", "Contacts", "DiscContact", "EdgeContact", "Onset", "PinContact", "Push",
-    "ShoulderContact", "contacts_of",
+    "Closed", "Contact", "ContactState", "DiscContact", "EdgeContact", "Onset", "PinContact", "Push", "ShoulderContact",
+    "actions_of", "contacts_of", "least_clearance", "pushes_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -315,46 +315,28 @@ class ShoulderContact(SpatialContact):
         )
 
 
-@dataclass(frozen=True)
-class Contacts:
-    """All contacts of a mechanism.
-
-    onsets: of each contact its speed of approach while it touches, None while it does not.
-    """
-
-    each: tuple[Contact, ...] = ()
-    labels: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", tuple(contact.label for contact in self.each))
-
-    @property
-    def least_clearance(self) -> float:
-        """m."""
-        return min((contact.clearance for contact in self.each), default=0.0)
-
-    def states(self, walk: Forward) -> list[ContactState]:
-        """Where all surfaces are."""
-        return [contact.state(walk) for contact in self.each]
-
-    def pushes(self, walk: Forward, onsets: Sequence[Onset]) -> list[tuple[ContactState, Push]]:
-        """The forces of all contacts."""
-        states = self.states(walk)
-        return [
-            (state, contact.push(state, onset)) for contact, state, onset in zip(self.each, states, onsets, strict=True)
-        ]
-
-    def actions(self, walk: Forward, onsets: Sequence[Onset]) -> Iterator[tuple[str, LoadAction]]:
-        """What those that touch do to the links, by label."""
-        for contact, onset in zip(self.each, onsets, strict=True):
-            if onset is not None:
-                state = contact.state(walk)
-                yield contact.label, contact.action(walk, state, contact.push(state, onset))
+def pushes_of(contacts: Sequence[Contact], walk: Forward, onsets: Sequence[Onset]) -> list[tuple[ContactState, Push]]:
+    """Where the surfaces of contacts are, and their forces."""
+    states = [contact.state(walk) for contact in contacts]
+    return [(state, contact.push(state, onset)) for contact, state, onset in zip(contacts, states, onsets, strict=True)]
 
 
-def contacts_of(run: Run, joints: Sequence[str]) -> Contacts:
+def actions_of(contacts: Sequence[Contact], walk: Forward, onsets: Sequence[Onset]) -> Iterator[tuple[str, LoadAction]]:
+    """What the contacts that touch do to the links, by label."""
+    for contact, onset in zip(contacts, onsets, strict=True):
+        if onset is not None:
+            state = contact.state(walk)
+            yield contact.label, contact.action(walk, state, contact.push(state, onset))
+
+
+def least_clearance(contacts: Sequence[Contact]) -> float:
+    """Of some contacts, m."""
+    return min((contact.clearance for contact in contacts), default=0.0)
+
+
+def contacts_of(run: Run, joints: Sequence[str]) -> tuple[Contact, ...]:
     """The contacts of joints in play of a mechanism as it is stated."""
-    return Contacts(tuple(contact for joint in joints for contact in _of_joint(run, joint)))
+    return tuple(contact for joint in joints for contact in _of_joint(run, joint))
 
 
 def _of_joint(run: Run, name: str) -> Iterator[Contact]:

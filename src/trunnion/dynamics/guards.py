@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,6 +95,13 @@ class Guards:
     passed: list[float] = field(default_factory=list)
     last: float = -np.inf
 
+    def __post_init__(self) -> None:
+        motion, alone = self.motion, len(self.motion.system.mechanism.drivers) == 1
+        # of several free coordinates those that have a range
+        self._limited = [(k, name) for k, name in enumerate(motion.names) if motion.several and name in self.limits]
+        # modules that are looked at, with their rows of `margins`: of one driver alone those that are passed
+        self._meeting = [(row, k) for row, k in enumerate(motion.meeting) if not alone or motion.passes(k)]
+
     def bounded(self, stretch: Stretch, before: Stretch | None) -> tuple[Stretch, Ended | None]:
         """A step up to the first end of the motion within it or just ahead, and that end. before: the step that it goes
         on from, if there is one."""
@@ -106,12 +112,6 @@ class Guards:
         return self._continued(stretch)._replace(end=max(stretch.begin, ended.time)), ended
 
     # ---- ranges -----------------------------------------------------------------------------------------------
-
-    @cached_property
-    def _limited(self) -> list[tuple[int, str]]:
-        """Of several free coordinates those that have a range."""
-        several = len(self.motion.names) > 1
-        return [(k, name) for k, name in enumerate(self.motion.names) if several and name in self.limits]
 
     def _out_of_range(self, stretch: Stretch) -> Iterator[Ended]:
         n = self.layout.coordinates
@@ -131,13 +131,6 @@ class Guards:
                     yield Ended("simulate.range", time, {"driver": name, "coordinate": level})
 
     # ---- change points ----------------------------------------------------------------------------------------
-
-    @cached_property
-    def _meeting(self) -> list[tuple[int, int]]:
-        """The modules that are looked at, with their rows of `margins`: of one driver alone those that are passed."""
-        alone = len(self.motion.system.mechanism.drivers) == 1
-        rows = enumerate(self.motion.meeting)
-        return [(row, module) for row, module in rows if not alone or self.motion.passes(module)]
 
     def _change_points(self, stretch: Stretch, before: Stretch | None) -> Iterator[Ended]:
         """Where 1/condition of a module touches zero, see `solve.change_points`; what is passed is taken down.
@@ -215,7 +208,7 @@ class DeadCentre:
         """Time, s, and place of a dead centre that the steps run into, if they are near; size: of the last step, s."""
         self.shrunk, self.last = (self.shrunk + 1 if size <= self.last else 0), size
         n = self.layout.coordinates
-        if len(self.motion.names) != 1 or not hasattr(solver, "f"):
+        if self.motion.several or not hasattr(solver, "f"):
             return None
         row, speed, second = solver.y, float(solver.y[n]), float(solver.f[n])
         if self.shrunk < SHRUNK or not speed * second < 0.0:

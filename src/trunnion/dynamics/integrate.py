@@ -345,7 +345,7 @@ class Integration(ABC):
         n = self.layout.coordinates
         speed = float(row[n])
         level = between[1] if speed > 0 else between[0]
-        if len(self.motion.names) != 1 or not np.isfinite(level) or speed == 0.0:
+        if self.motion.several or not np.isfinite(level) or speed == 0.0:
             return None
         if not (level - row[0]) / speed < step:
             return None
@@ -354,7 +354,7 @@ class Integration(ABC):
 
     def _left_range(self, before: Array, after: Array) -> float | None:
         """The end of its range that one coordinate, which stood there, has left by more than rounding."""
-        for end, outward in zip(self.ends[:, 0], (-1.0, 1.0), strict=True) if len(self.motion.names) == 1 else ():
+        for end, outward in zip(self.ends[:, 0], (-1.0, 1.0), strict=True) if not self.motion.several else ():
             slack = NEAR * max(1.0, abs(end))
             if abs(before[0] - end) <= slack < outward * (after[0] - end):
                 return float(end)
@@ -365,7 +365,7 @@ class Integration(ABC):
         n = self.layout.coordinates
         if self.sense and self.sense * after[n] <= 0.0:
             return Passing(n, 0.0)
-        if len(self.motion.names) == 1:
+        if not self.motion.several:
             low, high = self.ends[:, 0]
             for level in between:
                 if level in (low, high) and low <= after[0] <= high:  # it comes back by rounding
@@ -503,7 +503,7 @@ class Integration(ABC):
         if self._locked(time, row, causes):
             return time, row, None
         code = next(filter(None, causes), "step")
-        if code == "not_assembled" and not causes[0] and len(self.motion.names) == 1:  # it can be assembled until then
+        if code == "not_assembled" and not causes[0] and not self.motion.several:  # it can be assembled until then
             self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
         else:
             self._stop(code, time, row)

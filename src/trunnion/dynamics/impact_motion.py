@@ -65,14 +65,14 @@ def strike(delassus: Array, before: Array, restitution: Array, friction: Array) 
     delassus: G, 1/kg, (2 places, 2 places); before: γ⁻, m/s, (2 places,), normals first; restitution, friction: of each
     place.
     Newton's law may gain energy where friction turns the slip round (T. R. Kane, D. A. Levinson, Dynamics: Theory and
-    Applications, McGraw-Hill, 1985); the restitutions are then lowered together until nothing is gained, for without
-    any the law always loses.
+    Applications, McGraw-Hill, 1985), or no case may fit it; the restitutions are then lowered together until one does
+    that gains nothing, for without any the law always loses.
     """
     struck = _struck(delassus, before, restitution, friction)
-    if struck is None:
-        return None
-    if struck.loss >= -CLOSE * float(np.abs(struck.impulse) @ (np.abs(before) + np.abs(struck.after))):
-        return struck
+    if struck is not None:
+        rounding = CLOSE * float(np.abs(struck.impulse) @ (np.abs(before) + np.abs(struck.after)))
+        if struck.loss >= -rounding:
+            return struck
     low, high, best = 0.0, 1.0, None
     for _ in range(HALVINGS):
         share = 0.5 * (low + high) if best is not None else 0.0

@@ -10,10 +10,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Hashable, Sequence
-from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import cache, cached_property, partial
 from operator import itemgetter
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,7 @@ STATED = ("walk", "travels", "margin_up_to", "margin")  # of a `Backward`, by wh
 
 
 _recorded: dict[Hashable, RowCode] = {}
+_recording = Lock()  # who asks meanwhile waits: by NumPy it would take longer
 
 
 def code_of(system: System, values: Values, assembly: Assembly, passed: Pass) -> RowCode | None:
@@ -66,12 +67,14 @@ def code_of(system: System, values: Values, assembly: Assembly, passed: Pass) ->
     if system.inverse or literal is None:
         return None
     key = literal, tuple(place if isinstance(place, int) else id(place) for place in assembly)
-    if key not in system.codes:
-        if len(system.codes) > MOST_CODES:
-            return None
-        system.codes[key] = None
-        with suppress(UntraceableError):
-            system.codes[key] = _of_form((_form(system), *key), system, values, assembly, passed)
+    if key not in system.codes and len(system.codes) > MOST_CODES:
+        return None
+    with _recording:
+        if key not in system.codes:
+            try:
+                system.codes[key] = _of_form((_form(system), *key), system, values, assembly, passed)
+            except UntraceableError:
+                system.codes[key] = None
     code: RowCode | None = system.codes[key]
     return code
 

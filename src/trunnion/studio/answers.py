@@ -186,7 +186,7 @@ def _solved(question: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Datase
             findings = [*findings, *more] if state.bare else more or findings
         except MechanismError as error:
             findings += state.placed(error.findings)
-    lacks = missing(_sketch(question), findings)
+    lacks = missing(Sketch(dict(state.entries or {})), findings)
     ready = readiness(state.mechanism, result, findings, lacks)
     rows = [_row(state, finding, result) for finding in findings]
     return result, {"findings": rows, "missing": lacks, "ready": ready}

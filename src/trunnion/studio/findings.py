@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["cures", "figures", "margin_of", "missing", "reached", "readiness", "remedied", "sentence", "spoken"]
 
+MOST_RATIOS = 12  # of a longer row nobody reads them
 ENOUGH = 0.9  # of the friction at which it just runs: what is tried
 NOUNS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
@@ -88,6 +89,8 @@ def _ratios(state: Loaded) -> tuple[tuple[str, float], ...]:
     run = state.run
     driven = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
     driven = [output for output in driven if output.kind == "slide"] or driven
+    if len(driven) > MOST_RATIOS:
+        return ()
     measures = [Measure(output.subject, "time_ratio", output.subject) for output in driven]
     ratios = figures_of(run, measures, FrictionMethod()) if measures else {}
     return tuple((joint, float(ratio)) for joint, ratio in ratios.items() if np.isfinite(ratio))

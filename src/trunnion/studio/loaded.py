@@ -35,6 +35,9 @@ MOST_LINKS = 400  # that are solved while one draws
 STEPS, MOST_STEPS = 360, 3600
 
 
+_reading = Lock()  # a question that is asked meanwhile finds what was read for the one before
+
+
 class Cycle:
     """A mechanism over its cycle, worked out as far as it is asked for.
 
@@ -121,16 +124,14 @@ class Loaded:
         """The mechanism prepared; MechanismError if its structure does not determine its motion."""
         if self.mechanism is None:
             raise MechanismError(self.findings)
-        return prepare(self.mechanism)
+        with _reading:
+            return prepare(self.mechanism)
 
     @lru_cache(maxsize=3)  # noqa: B019  # a handful of texts is kept, see `loaded`
     def cycle(self, steps: int, friction: bool) -> Cycle:
         """Its cycle with the friction that is stated, or with none."""
         run = self.run
         return Cycle(run if friction else prepare(run.system.mechanism.with_friction("off")), steps)
-
-
-_reading = Lock()  # a question that is asked meanwhile finds what was read for the one before
 
 
 def loaded(text: str) -> Loaded:

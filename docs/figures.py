@@ -129,10 +129,9 @@ class _Drawing:
         return self.found
 
     def _draw(self, folder: Path) -> dict[str, bytes]:
-        from trunnion import analyse, assemble, read, report
-        from trunnion.views.assembly import figure as fit
+        from trunnion import analyse, assemble, plot, read, report
         from trunnion.views.assembly.mode_drawings import ways
-        from trunnion.views.cycle.plots import figure, save
+        from trunnion.views.draw import save
 
         if (EXAMPLES / f"{self.base}.yaml").is_file():
             mechanism = self.gallery.model(self.base)
@@ -158,7 +157,7 @@ class _Drawing:
 
         special = {
             "assemblies": lambda: ways(mechanism),
-            "assemble": lambda: fit.figure(assemble(mechanism, self.steps)),
+            "assemble": lambda: plot(assemble(mechanism, self.steps)),
         }
         contents = {}
         for name in self.wanted:
@@ -166,7 +165,9 @@ class _Drawing:
             if name == "report.html":
                 contents[name] = report(real(), ideal()).encode()
                 continue
-            draw = special.get(kind) or (lambda kind=kind: figure(real(), kind, ideal() if kind in COMPARED else None))
+            draw = special.get(kind) or (
+                lambda kind=kind: plot(real(), kind, ideal=ideal() if kind in COMPARED else None)
+            )
             contents[name] = bytes(save(draw(), path).read_bytes())
         return contents
 

@@ -20,7 +20,7 @@ from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.figure import Figure as Figure
 from trunnion.results.save import frame, save
 from trunnion.results.tables import KINDS, kind_of
-from trunnion.views.shown import animation_of, figure_of, html_of, report_of
+from trunnion.views.shown import animation_of, figure_of, report_of, result_html
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,4 +95,4 @@ class Accessor:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the figures that one looks at first, and the findings."""
-        return html_of(self._result)
+        return result_html(self._result)

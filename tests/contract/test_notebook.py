@@ -14,7 +14,7 @@ from matplotlib import pyplot
 from test_report import Page
 
 import trunnion
-from trunnion.views import notebook
+from trunnion.views import shown as notebook
 from trunnion.views.page import hashed
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -15,7 +15,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run
 from played import four_bar
-from trunnion.views.play import figure
+from trunnion.views.shown import figure_of as figure
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"

@@ -117,7 +117,7 @@ def test_a_wrong_zero_of_the_angle_is_not_taken_for_half_a_step(tmp_path: Path, 
     assert (float(result["reduced_chi_squared"]) > 9) == (noise < 1)
     assert np.all(np.abs(result["sensor_error"].values) <= np.sqrt(3) + 1e-9)
     assert told["fit.misfit"].severity == "error"
-    table = sensors(result)
+    (table,) = sensors(result)
     assert table is not None
     assert re.fullmatch(r"\S+ ± \S+ °", next(row[1] for row in table.rows if row[0].startswith("angle in steps")))
 

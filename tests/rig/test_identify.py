@@ -22,7 +22,8 @@ from trunnion.rig.identification.signals import Model, limits, paths_of, unknown
 from trunnion.rig.reading.measurement import Accuracy, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.views.identify import KINDS, figure
+from trunnion.views.identify import KINDS
+from trunnion.views.shown import figure_of as figure
 
 FRICTION = "joint_defaults.friction.coefficient"
 SPEEDS = [{"A.speed": speed} for speed in (2.0, 4.0, 6.0, 8.0, 10.0)]

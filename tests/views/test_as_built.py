@@ -10,12 +10,12 @@ import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
 
 import trunnion
-from trunnion.views.cycle import plots
 from trunnion.views.cycle.deviations import (
     losses,
     seated,
 )
 from trunnion.views.cycle.scene import scene
+from trunnion.views.shown import figure_of
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def _label(axes, name):
 
 @pytest.mark.slow
 def test_errors_are_those_of_the_result(slider):
-    figure = plots.figure(slider, "error")
+    figure = figure_of(slider, "error")
     place, slide = figure.axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
     assert _label(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
@@ -51,7 +51,7 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
     result = four_bar()
     (one,) = seated(result)
     assert (one.joint, one.kind, one.clearance, one.links) == ("B", "pin", pytest.approx(2e-5), ("crank", "coupler"))
-    axes = plots.figure(result, "beta").axes
+    axes = figure_of(result, "beta").axes
     assert len(axes) == 1  # no β in the plane
     assert axes[0].lines[1].get_ydata() == pytest.approx(30.0)
 

@@ -20,11 +20,8 @@ from rig_measurements import measured, rocker
 from trunnion.cli.app import main
 from trunnion.results.tables.studies import COMPARISON as TABLES
 from trunnion.rig.reading.measurement import Measurement
-from trunnion.views.compare import (
-    efficiencies,
-    figure,
-    report,
-)  # fmt: skip
+from trunnion.views.compare import efficiencies, report
+from trunnion.views.shown import figure_of as figure
 
 POWERS = ("torque", "speed", "brake", "out")
 FRICTION = "joint_defaults.friction.coefficient"
@@ -94,7 +91,7 @@ def test_courses_have_band_model_and_residual():
 def test_difference_of_efficiencies_is_measured_less_model():
     """A reading of the drive torque that is too large makes the measured efficiency too small."""
     result = case("wrong")
-    measured_, _, model, difference = (float(cell.replace("−", "-")) for cell in efficiencies(result).rows[0][1:5])
+    measured_, _, model, difference = (float(cell.replace("−", "-")) for cell in efficiencies(result)[0].rows[0][1:5])
     assert measured_ < model - 0.01
     assert difference == pytest.approx(measured_ - model, abs=1.5e-4)
     assert difference == pytest.approx(float(result.efficiency[0] - result.efficiency_model[0]), abs=6e-5)

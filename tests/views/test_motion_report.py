@@ -27,11 +27,11 @@ from trunnion.dynamics.result import spectrum
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.tables import columns
-from trunnion.views.cycle import plots
 from trunnion.views.cycle.scene import scene
-from trunnion.views.motion.figure import KINDS, OF_CONTACTS, figure
+from trunnion.views.motion.figure import KINDS, OF_CONTACTS
 from trunnion.views.motion.report import motion_scene, report
 from trunnion.views.motion.shown import shown
+from trunnion.views.shown import figure_of
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}
 
@@ -126,13 +126,13 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
     law = {"law": "cycloidal", "range": [0.3, 1.2], "duration": 2.0, "returns": False}
     result = analyse(Mechanism(**{**data, "drivers": {"A": law}}), 20)
     wanted = 0.45 * (1 - np.cos(np.pi * result["time"].values))
-    (line,) = (one for one in plots.figure(result, "speed").axes[0].lines if len(one.get_ydata()) == 20)
+    (line,) = (one for one in figure_of(result, "speed").axes[0].lines if len(one.get_ydata()) == 20)
     assert line.get_ydata() == pytest.approx(wanted, abs=1e-12)
     assert scene(result)["drivers"][0]["speed"] == pytest.approx(wanted, abs=1e-6)
     even = analyse(Mechanism(**data), 12)
     assert scene(even)["drivers"][0]["speed"] == []
     with pytest.raises(MechanismError, match="the speed of no driver varies"):
-        plots.figure(even, "speed")
+        figure_of(even, "speed")
 
 
 @pytest.mark.sample(6)
@@ -140,7 +140,7 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in OF_CONTACTS])
 def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: str) -> None:
     name, result = motion
-    drawn = figure(result, kind)
+    drawn = figure_of(result, kind)
     drawn.canvas.draw()
     for axes in drawn.axes if kind != "phase" else ():
         labels = [text.get_text() for text in axes.get_legend().get_texts()] if axes.get_legend() else []
@@ -201,7 +201,7 @@ def rattled() -> xr.Dataset:
 
 
 def test_the_path_of_the_pin_lies_in_its_hole() -> None:
-    made = figure(rattled(), "orbit")
+    made = figure_of(rattled(), "orbit")
     (axes,) = made.axes
     lines = {len(line.get_xdata()): line for line in axes.lines}
     (wall,), path = axes.patches, lines[701]
@@ -212,7 +212,7 @@ def test_the_path_of_the_pin_lies_in_its_hole() -> None:
 
 def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
     result = trunnion.simulate(rattling_in_space(), duration=3e-4, steps=100)
-    panels = figure(result, "orbit").axes
+    panels = figure_of(result, "orbit").axes
     assert [axes.get_title(loc="left").partition(":")[0] for axes in panels] == ["Q.end_1", "Q.end_2"]
     for axes in panels:
         path = next(line for line in axes.lines if len(line.get_xdata()) == 101)

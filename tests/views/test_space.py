@@ -14,10 +14,11 @@ from test_report import Page
 
 from trunnion.errors import MechanismError, Status
 from trunnion.results.tables import columns
-from trunnion.views.cycle import plots
-from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
+from trunnion.views.cycle.plots import PLOTS, READY, mechanism
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
+from trunnion.views.draw import save
+from trunnion.views.shown import figure_of
 from trunnion.views.space.bodies import space
 from trunnion.views.space.figure import facets
 from trunnion.views.space.scene import screw_axis
@@ -39,9 +40,9 @@ def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
     kind, result = spatial
     if name == "mechanism" and kind in BLANK:
         with pytest.raises(MechanismError, match="nothing to draw"):
-            plots.figure(result, name)
+            figure_of(result, name)
         return
-    figure = plots.figure(result, name, result)
+    figure = figure_of(result, name, ideal=result)
     # in one format each: every figure comes up in both, and so does every result
     suffix = ("png", "svg")[([*PLOTS].index(name) + [*SPATIAL].index(kind)) % 2]
     assert 5_000 < save(figure, tmp_path / f"figure.{suffix}").stat().st_size < 3_000_000

@@ -12,8 +12,8 @@ from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 import trunnion
 from trunnion import Status, save
-from trunnion.views.scales import arrange
-from trunnion.views.sweep import figure, tables
+from trunnion.views.shown import figure_of as figure
+from trunnion.views.sweep import arrange, tables
 
 EXAMPLES = File(__file__).parents[2] / "examples"
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
@@ -85,15 +85,14 @@ def test_lines_of_a_map_lie_where_the_field_has_their_number():
 def test_a_table_for_each_value_of_further_names():
     grid = {"misalignment": scale(range(50)), "input.speed": SPEED, "mu": FRICTION, "r": scale([1])}
     result = swept(grid, lambda a, s, m, r: a + s + m, lambda a, s, *_: 5 if (a, s) == (0, 50) else 0)
-    found = tables(result, ["efficiency"], room=80)
+    found = tables(result, ["efficiency"])
     assert len(found) == 3
-    assert "at mu = 0.1, r" in found[1].title
+    assert "at mu = 0.1, r" in found[1].title.replace("\u00a0", " ")
     for table, friction in zip(found, (0.05, 0.1, 0.2), strict=True):
         assert table.head[0] == "misalignment"
         assert (table.head[1], table.head[-1]) == ("50 rpm", "1500 rpm")
         assert table.rows[0][1] == "locked"
         assert float(table.rows[-1][-1]) == pytest.approx(49 + 1500 + friction)
-        assert sum(3 + max(map(len, column)) for column in zip(table.head, *table.rows, strict=True)) <= 80
         assert len(table.rows) * (len(table.head) - 1) + table.left_out == 50 * 20
     many = tables(swept({"a": FEW, "b": FEW, "c": scale(range(50))}))
     assert len(many) == 6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 
 import numpy as np
@@ -9,7 +10,6 @@ import pytest
 import xarray as xr
 from as_built_models import EXAMPLES
 from matplotlib.axis import Tick
-from matplotlib.colors import to_hex
 from matplotlib.text import Text
 from stand_in_tolerances import CASES, LIMIT, toleranced
 
@@ -17,17 +17,20 @@ import trunnion
 from trunnion.errors import MechanismError
 from trunnion.results.save import save as export
 from trunnion.studies.tolerance.sampled import QUANTILES
+from trunnion.views import draw
 from trunnion.views.allocation import trade_off
-from trunnion.views.common.figures import PALETTE
-from trunnion.views.readings import readings, share_interval
+from trunnion.views.charts import Band, Rule
+from trunnion.views.shown import figure_of as figure
 from trunnion.views.tolerance import (
     KINDS,
     MOST_PANELS,
     corners,
-    figure,
+    histogram,
     indices,
     inputs,
     overview,
+    readings,
+    share_interval,
     tables,
 )
 
@@ -78,9 +81,9 @@ def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
     reads = [read for read in readings(case) if read.name in few(case)]
     if not any(KINDS[kind].ready(read) for read in reads):
         with pytest.raises(MechanismError, match=f"no measure has a figure '{kind}'"):
-            figure(case, kind, few(case))
+            figure(case, kind, measures=few(case))
         return
-    assert not outside(figure(case, kind, few(case)))
+    assert not outside(figure(case, kind, measures=few(case)))
 
 
 @pytest.mark.slow
@@ -95,19 +98,22 @@ def test_every_result_makes_tables(case):
 
 def test_the_histogram_counts_the_samples_within_and_beyond_the_limits():
     result = toleranced()
-    (axes,) = (part.axes[0] for part in figure(result, "histogram").subfigs)
-    within, beyond = axes.patches[:2]
-    assert [to_hex(one.get_facecolor()) for one in (within, beyond)] == list(PALETTE[:2])
-    drawn = within.get_data()
-    assert drawn.values.sum() == result.histogram.values.sum()
-    assert np.isin(np.round(np.radians(drawn.edges), 12), np.round(result.edge.values[0], 12)).all()
-    limits = [one.get_xdata()[0] for one in axes.lines if to_hex(one.get_color()) == "#a1260d"]
-    assert limits == [pytest.approx(0.1)]  # the size of a deviation has no lower one
-    seen = axes.transData.inverted().transform(within.get_clip_box().get_points())[:, 0]
-    assert seen == pytest.approx([drawn.edges[0], 0.1])
+    (chart,) = histogram(readings(result)[0]).charts
+    within, beyond = (mark for mark in chart.marks if isinstance(mark, Band))
+    assert (within.look.colour, beyond.look.colour) == (0, 1)
+    x, bars = np.radians(within.x), within.high[:-1] + beyond.high[:-1]
+    starts = np.searchsorted(result.edge.values[0] + 1e-12, x)
+    whole = np.abs(x - LIMIT) > 1e-12
+    assert np.isin(np.round(x[whole], 12), np.round(result.edge.values[0], 12)).all()
+    tally = [result.histogram.values[0][low:high].sum() for low, high in itertools.pairwise(starts[whole])]
+    assert bars[whole[:-1]] == pytest.approx(tally)
+    assert np.all((within.high[:-1] > 0) <= (x[1:] <= LIMIT + 1e-12))
+    assert np.all((beyond.high[:-1] > 0) <= (x[:-1] >= LIMIT - 1e-12))
+    rules = {mark.name: mark.at for mark in chart.marks if isinstance(mark, Rule)}
+    assert rules["limit ±0.1°"] == pytest.approx(0.1)  # the size of a deviation has no lower one
     value = float(result["yield"][0])
-    assert f"within {share_interval(value, float(result.yield_low[0]), float(result.yield_high[0]))}" in labels(axes)
-    assert axes.get_xlabel() == "angle-error [°]"
+    assert within.name == f"within {share_interval(value, float(result.yield_low[0]), float(result.yield_high[0]))}"
+    assert chart.x.title == "angle-error [°]"
 
 
 def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
@@ -154,29 +160,29 @@ def test_contributions_are_sorted_and_add_up():
 
 
 def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
-    result = toleranced(24, 100)
     shares = np.linspace(0.25, 2, 8)
     costs = np.where(shares < 0.4, np.nan, 16.456705 / shares**0.45)
-    drawn = trade_off(result, list(zip(shares, costs, strict=True)))
+    points = {"trade_off_factor": ("offer", shares), "trade_off_cost": ("offer", costs)}
+    result = xr.Dataset(points, attrs={"choices": "discrete", "prices": '[{"model": ""}]'})
+    drawn = draw.figure(result, trade_off(result))
     (axes,) = drawn.axes
     assert not outside(drawn)
     assert line(axes, "stated limits") == pytest.approx(np.array([[100, 16.456705]]), rel=1e-3)
     assert [text.get_text() for text in axes.texts] == ["infeasible"]
-    stepped = trade_off(result, [(one, float(np.ceil(6 / one) // 3)) for one in shares], stepped=True)
-    assert stepped.axes[0].lines[0].get_drawstyle() == "steps-post"
+    assert axes.lines[0].get_drawstyle() == "steps-post"
 
 
 @pytest.mark.slow
 def test_corners_indices_and_failures_are_told():
     read = readings(toleranced(72))[0]
-    table = corners(read)
+    (table,) = corners(read)
     assert table.head[0] == "worst corner"
     assert {row[0] for row in table.rows} == {f"dimensions.l{k}" for k in (1, 2, 3, 4)}
     assert {cell for row in table.rows if row[0] == "dimensions.l1" for cell in row[1:]} <= {
         "99.93\u00a0mm",
         "100.07\u00a0mm",
     }
-    assert corners(readings(CASES["linear only"]())[0]) is None
+    assert corners(readings(CASES["linear only"]())[0]) == []
     shares = CASES["sobol"]()
     largest = str(shares["parameter"].values[int(shares["total_order"].values[0].argmax())])
     assert largest.endswith(indices(readings(shares)[0]).rows[0][0])

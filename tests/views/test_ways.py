@@ -9,8 +9,7 @@ import trunnion
 from mechanisms import MODELS, build, stephenson_six_bar, watt_six_bar
 from trunnion.errors import MechanismError
 from trunnion.views.assembly.mode_drawings import ways
-from trunnion.views.common.figures import INK, RULE
-from trunnion.views.cycle.plots import save
+from trunnion.views.draw import INK, RULE, save
 
 
 def panels(figure):

@@ -78,7 +78,7 @@ def data(mapping: Path, shared: Files, files: list[Path] | None = None) -> None:
     from trunnion.results.save import save
     from trunnion.rig.reading.measurement import dataset
     from trunnion.rig.reading.read import read_measured
-    from trunnion.views.measured import tables
+    from trunnion.views.compare import measurement_tables as tables
 
     check_files(shared, drawn=False)
     measurement = read_measured(mapping, files)

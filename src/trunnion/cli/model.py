@@ -38,7 +38,7 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
     from trunnion.cycle.inspect import check as inspect
 
     if assemblies:
-        from trunnion.views.cycle.plots import check_figure
+        from trunnion.views.draw import check_figure
 
         check_figure(assemblies)
     mechanism = model.read()
@@ -48,7 +48,7 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
     _show_structure(checked, len(mechanism.drivers))
     if assemblies:
         from trunnion.views.assembly.mode_drawings import ways as drawings
-        from trunnion.views.cycle.plots import save
+        from trunnion.views.draw import save
 
         save(drawings(mechanism, checked.choices), assemblies)
         wrote(assemblies)

@@ -78,9 +78,11 @@ def plot(
     format_: str = "png", uncut: bool = False,
 ) -> None:  # fmt: skip
     """Plot a cycle: torque, friction power, reactions, mechanism."""
+    from trunnion.views.axis import whole_peaks
     from trunnion.views.charts import check_kind
-    from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.plots import PLOTS, drawable, figure, save
+    from trunnion.views.cycle.plots import PLOTS, drawable
+    from trunnion.views.draw import save
+    from trunnion.views.shown import figure_of
 
     for name in kind or []:
         check_kind(name, PLOTS)
@@ -95,7 +97,7 @@ def plot(
     if not single:
         folder(out)
     drawn = whole_peaks(result, uncut)
-    for name, picture in [(name, figure(drawn, name, ideal, at)) for name in kind or drawable(result)]:
+    for name, picture in [(name, figure_of(drawn, name, ideal=ideal, at=at)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{format_.lstrip('.')}"
         save(picture, path)
         wrote(path)
@@ -105,7 +107,7 @@ def plot(
 @verb(out="The HTML file to write.")
 def report(model: Model, out: Path, settled: Friction, steps: int = 360, uncut: bool = False) -> None:
     """Write an HTML report: animation, plots, findings, inputs."""
-    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.axis import whole_peaks
     from trunnion.views.shown import report_of
 
     check_target(out, "--out", "a report", PAGES)

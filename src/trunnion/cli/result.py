@@ -128,7 +128,7 @@ class Shown:
     @property
     def pictured(self) -> xr.Dataset:
         """The result as pictures show it."""
-        from trunnion.views.common.peaks import whole_peaks
+        from trunnion.views.axis import whole_peaks
 
         return whole_peaks(self.dataset, self.uncut)
 
@@ -142,7 +142,7 @@ class Shown:
         files = self.files
         for path in files.out or ():
             if path.suffix.lower() in IMAGES:
-                from trunnion.views.cycle.plots import save as save_figure
+                from trunnion.views.draw import save as save_figure
                 from trunnion.views.shown import figure_of
 
                 save_figure(figure_of(self.pictured, **self.drawn), path)

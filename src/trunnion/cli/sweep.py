@@ -3,7 +3,7 @@
 from trunnion.cli.files import verb
 from trunnion.cli.options import IMAGES, Files, Model, over, points
 from trunnion.cli.result import Shown, check_files, show_tables
-from trunnion.cli.terminal import bar, console, line
+from trunnion.cli.terminal import bar, line
 from trunnion.errors import Finding, MechanismError, counted
 
 __all__ = ["sweep"]
@@ -28,8 +28,7 @@ def sweep(
     """
     from trunnion.studies.sweep.study import sweep as run
     from trunnion.views.charts import check_kind
-    from trunnion.views.scales import KINDS, check_axes, check_measure
-    from trunnion.views.sweep import tables
+    from trunnion.views.sweep import KINDS, check_axes, check_measure, tables
 
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
@@ -52,7 +51,7 @@ def sweep(
         )  # fmt: skip
 
     def show() -> None:
-        parts = tables(result, measures, x, family, console().width)
+        parts = tables(result, measures, x, family)
         show_tables(mechanism.name or str(model.file), parts, apart=False)
         left_out = sum(table.left_out for table in parts) // (len(measures) if len(parts) > 1 else 1)
         if left_out:

@@ -263,7 +263,7 @@ class WorkedOut(dict[str, Any]):
 
 def _notebook() -> Any:
     """The views of a notebook, by name: they stand above the model, which knows nothing else of them."""
-    return import_module("trunnion.views.notebook")
+    return import_module("trunnion.views.shown")
 
 
 def _canonical(value: Any) -> Any:

@@ -25,7 +25,7 @@ from trunnion.solve.run import prepare
 from trunnion.solve.system import felt, rubbing
 from trunnion.studio.loaded import Asked, Loaded
 from trunnion.studio.sketch import Sketch
-from trunnion.views.common.cycle import abscissa, names
+from trunnion.views.axis import abscissa, names
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from functools import lru_cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from trunnion.views.common.bundle import module
+from trunnion.views.page import module
 
 __all__ = ["document", "found", "one_file", "script"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,16 +12,13 @@ from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import drawn_in, joined, number
 from trunnion.views import tolerance
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Stripe, check_kind
-from trunnion.views.common.cycle import names
+from trunnion.views.axis import names
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe, check_kind
 from trunnion.views.page import NONE, Section, Table
-from trunnion.views.readings import is_play, readings, share, share_interval
+from trunnion.views.tolerance import is_play, readings, share, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
-
-__all__ = ["KINDS", "figure", "headed", "report", "tables", "trade_off"]
 
 KINDS = ("trade-off", *tolerance.KINDS)
 CRITERIA = {"worst-case": "worst case", "rss": "root of the sum of squares", "yield": "yield"}
@@ -36,27 +32,25 @@ def tables(result: xr.Dataset) -> list[Table]:
     if not result.attrs["found"]:
         return []
     parts = [bought(result).titled(headed(result)), room(result)]
-    parts += [offers_table(result)] if "trade_off_cost" in result else []
+    parts += [offers(result)] if "trade_off_cost" in result else []
     return [*parts, *tolerance.tables(result)]
 
 
 def headed(result: xr.Dataset) -> str:
     """The criterion, the cost, and what is known of the optimum."""
-    by_yield = result.attrs["criterion"] == "yield"
-    text = CRITERIA[str(result.attrs["criterion"])]
+    by_yield, text = result.attrs["criterion"] == "yield", CRITERIA[str(result.attrs["criterion"])]
     if by_yield:
         text += f" of {share(float(result.attrs['target']))}"
         sampled = float(result["yield_all"]) if "yield_all" in result else math.nan
         if sampled < float(result.attrs["target"]):
             text += f" (sampled {_percent(sampled)})"
     cost, before = float(result["cost_total"]), float(result["cost_total_before"])
-    text += f": cost {cost:.8g}"
-    text += f", as stated {before:.8g}" if math.isfinite(before) else ""
+    text += f": cost {cost:.8g}" + (f", as stated {before:.8g}" if math.isfinite(before) else "")
     if not by_yield:
-        return f"{text}, {'global optimum to first order' if result.attrs['proven'] else 'best found'}"
-    if "yield_checked" in result:
-        checked, *ends = (float(result[f"yield_checked{end}"]) for end in ("", "_low", "_high"))
-        text += f", yield of fresh samples {share_interval(checked, *ends)}"
+        text += f", {'global optimum to first order' if result.attrs['proven'] else 'best found'}"
+    elif "yield_checked" in result:
+        ends = (float(result[f"yield_checked{end}"]) for end in ("", "_low", "_high"))
+        text += f", yield of fresh samples {share_interval(*ends)}"
     return text
 
 
@@ -64,21 +58,20 @@ def bought(result: xr.Dataset) -> Table:
     """Each tolerance that has a cost: what it is to be, what it costs, and what it was."""
     units, paths = units_along(result["tolerance"], "parameter"), names(result, "parameter")
     groups = {str(row["path"]): str(row["group"]) for row in attribute(result, "prices")}
-    rows = []
-    for j in np.flatnonzero(result["bought"].values):
-        t, cost, part, was, paid = (
-            float(result[key].values[j])
-            for key in ("tolerance", "cost", "cost_share", "tolerance_before", "cost_before")
-        )
-        made, group = str(result["choice"].values[j]), groups.get(paths[j], "")
-        halves, sign = [], "" if is_play(paths[j]) else "±"
-        for half in (t, was):  # in mm or degrees, to five digits
-            factor, display_unit = drawn_in(half, units[j])
-            halves.append(joined(f"{sign}{half * factor:.5g}", display_unit) if math.isfinite(half) else NONE)
-        now, then = halves
-        rows.append([paths[j], now, made, group, _cost(cost), share(part, 1), then, _cost(paid)])
-    totals = (_cost(float(result[key])) for key in ("cost_total", "cost_total_before"))
-    rows.append(["all", "", "", "", next(totals), share(1.0), "", next(totals)])
+
+    def half(value: float, j: int) -> str:
+        """In mm or degrees, to five digits."""
+        factor, unit = drawn_in(value, units[j])
+        sign = "" if is_play(paths[j]) else "±"
+        return joined(f"{sign}{value * factor:.5g}", unit) if math.isfinite(value) else NONE
+
+    keys, rows = ("tolerance", "cost", "cost_share", "tolerance_before", "cost_before"), []
+    for j in np.flatnonzero(result["bought"].values).tolist():
+        width, cost, part, width_before, cost_before = (float(result[key].values[j]) for key in keys)
+        rows.append([paths[j], half(width, j), str(result["choice"].values[j]), groups.get(paths[j], ""), _cost(cost),
+                     share(part, 1), half(width_before, j), _cost(cost_before)])  # fmt: skip
+    total, before = (_cost(float(result[key])) for key in ("cost_total", "cost_total_before"))
+    rows.append(["all", "", "", "", total, share(1.0), "", before])
     head = ["parameter", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
     return Table("allocated tolerances", head, rows).without_empty()
 
@@ -92,17 +85,15 @@ def room(result: xr.Dataset) -> Table:
         lower, upper = (read.limits[0], read.room[1]) if read.is_size else read.room
         sides = ((read.value("searched_lower"), lower), (read.value("searched_upper"), upper))
         shares = [max(part / end, 0.0) for part, end in sides if math.isfinite(part + end) and end != 0]
-        ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
-        wider = 0.01 * read.value("saving") * min(ends) if ends else math.nan
-        rows.append(
-            [read.name, read.limits_said, _percent(read.value("used")), margin, _percent(max(shares, default=math.nan)),
-             _percent(read.value("yield")), NONE if math.isnan(wider) else f"{wider:.4g}"]
-        )  # fmt: skip
+        wider = 0.01 * read.value("saving") * min(abs(lower), abs(upper))
+        rows.append([read.name, read.limits_said, _percent(read.value("used")), margin,
+                     _percent(max(shares, default=math.nan)), _percent(read.value("yield")),
+                     f"{wider:.4g}" if math.isfinite(wider) else NONE])  # fmt: skip
     head = ["measure", "limits", "used", "margin", "worst case found", "yield", "1\u00a0% wider saves"]
     return Table("share of the limits that is used", head, rows).without_empty()
 
 
-def offers_table(result: xr.Dataset) -> Table:
+def offers(result: xr.Dataset) -> Table:
     """Cost over accuracy."""
     rows = [
         [f"{100 * factor:.4g}\u00a0%", _cost(cost) if math.isfinite(cost) else "infeasible"]
@@ -119,10 +110,10 @@ def _percent(value: float) -> str:
     return NONE if math.isnan(value) else f"{100 * value:.4g}\u00a0%"
 
 
-# ---- figures ----------------------------------------------------------------------------------------------------
+# ---- figures and report -----------------------------------------------------------------------------------------
 
 
-def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
+def figure(result: xr.Dataset, kind: str | None = None) -> Plot:
     """A kind of figure; if none is named, cost over accuracy where that was computed, else all of the tolerances.
 
     Raises
@@ -131,59 +122,38 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     """
     if not result.attrs["found"]:
         raise MechanismError(Finding("there is no allocation to draw", "--out", "widen the infeasible limits"))
-    if kind is None and "trade_off_cost" not in result:
-        return tolerance.sheet(result)
-    check_kind(kind or "trade-off", KINDS)
-    if kind in tolerance.KINDS:
+    kind = kind or ("trade-off" if "trade_off_cost" in result else None)
+    if kind is not None:
+        check_kind(kind, KINDS)
+    if kind != "trade-off":
         return tolerance.figure(result, kind)
     if "trade_off_cost" not in result:
         raise MechanismError(Finding("no measure has a figure 'trade-off'", "--kind", "add --curve 21"))
-    points = zip(result["trade_off_factor"].values.tolist(), result["trade_off_cost"].values.tolist(), strict=True)
-    models = any(row["model"] for row in attribute(result, "prices"))
-    return trade_off(result, list(points), result.attrs["choices"] == "discrete" and not models)
+    return trade_off(result)
 
 
-CHOSEN = Look(1, dash="none", mark="D", size=6.5, order=5)
+def trade_off(result: xr.Dataset) -> Plot:
+    """Least cost over accuracy, the stated limits marked, what no tolerances keep shaded.
 
-
-def trade_off(
-    result: xr.Dataset,
-    points: Sequence[tuple[float, float]],
-    stepped: bool = False,
-) -> Figure:
-    """Least cost over accuracy, the stated limits marked.
-
-    Parameters
-    ----------
-    result : whose name stands beneath
-    points : share of the stated limits, and the least cost that keeps them, NaN if nothing does
-    stepped : as with processes to choose from: what keeps a limit keeps any wider one too
+    A choice among processes alone makes a stair: what keeps a limit keeps any wider one too.
     """
-    from trunnion.views.draw import figure as draw
-
-    part, cost = (np.array(column, float) for column in zip(*sorted(points), strict=True))
-    marks: list[Mark] = [Line(100 * part, cost, "minimum cost", Look(0, 1.8, mark="o", size=3.2), steps=stepped)]
-    feasible, bottom = np.isfinite(cost), None
-    if feasible.any():
-        bottom = 0.0 if cost[feasible].min() > 0 else None
-        if part[feasible][0] <= 1.0 <= part[feasible][-1]:
-            stated_cost = float(np.interp(1.0, part[feasible], cost[feasible]))
-            label = f"stated limits: {number(stated_cost)}"
-            marks.append(Line(np.array([100.0]), np.array([stated_cost]), label, CHOSEN))
+    order = np.argsort(result["trade_off_factor"].values)
+    part, cost = (result[f"trade_off_{key}"].values[order].astype(float) for key in ("factor", "cost"))
+    stair = result.attrs["choices"] == "discrete" and not any(row["model"] for row in attribute(result, "prices"))
+    marks: list[Mark] = [Line(100 * part, cost, "minimum cost", Look(0, 1.8, mark="o", size=3.2), steps=stair)]
+    feasible = np.isfinite(cost)
+    if feasible.any() and part[feasible][0] <= 1.0 <= part[feasible][-1]:
+        stated = np.interp([1.0], part[feasible], cost[feasible])
+        look = Look(1, dash="none", mark="D", size=6.5, order=5)
+        marks.append(Line(np.array([100.0]), stated, f"stated limits: {number(float(stated[0]))}", look))
     if not feasible.all():
         lost = float(part[~feasible].max())
-        ends = 100 * part[0], 100 * float(min(part[feasible & (part > lost)], default=lost))
-        marks.append(Stripe(ends[0], ends[1], "infeasible", Look("rule", hatch="///", order=0.5)))
-    chart = Chart(
-        Axis("limits relative to the stated ones [%]"),
-        Axis("minimum cost", (bottom, None), count=7),
-        marks,
-        legend=Legend(least=1),
-    )
-    return draw("Minimum cost of all tolerances over accuracy", result, [Panel("", [chart], 3.75)])
-
-
-# ---- report -----------------------------------------------------------------------------------------------------
+        high = float(min(part[feasible & (part > lost)], default=lost))
+        marks.append(Stripe(100 * part[0], 100 * high, "infeasible", Look("rule", hatch="///", order=0.5)))
+    bottom = 0.0 if np.nanmin(cost, initial=np.inf) > 0 else None
+    across, up = Axis("limits relative to the stated ones [%]"), Axis("minimum cost", (bottom, None), count=7)
+    chart = Chart(across, up, marks, legend=Legend(1))
+    return Plot("Minimum cost of all tolerances over accuracy", [Panel("", [chart], 3.75)])
 
 
 def report(result: xr.Dataset) -> str:
@@ -194,6 +164,6 @@ def report(result: xr.Dataset) -> str:
     parts = [Section("Allocated tolerances", headed(result), tables=[bought(result), room(result)])]
     if "trade_off_cost" in result:
         about = "Minimum cost if all limits are multiplied by the same factor."
-        curve = [("Minimum cost over accuracy", figure(result, "trade-off"))]
-        parts.append(Section("Cost over accuracy", about, curve, [offers_table(result)]))
+        curve = [("Minimum cost over accuracy", trade_off(result))]
+        parts.append(Section("Cost over accuracy", about, curve, [offers(result)]))
     return tolerance.report(result, parts, kicker)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -16,19 +16,11 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.views.common.cycle import Abscissa, intervals
-from trunnion.views.common.peaks import ease, peak, usual_peak
+from trunnion.views.axis import Abscissa, Array, ease, intervals, peak, usual_peak
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "FREE", "Arrow", "Axis", "Band", "Bars", "Chart", "ColourScale", "Contours", "Legend", "Line", "Look", "Mark",
-    "Note", "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "check_kind", "nth", "outside", "over_drive",
-    "silent",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 RIPPLE = 0.1  # of the largest value: curves that vary by less are shown without 0
 COLOURS, DASHES = 6, ("solid", "long", "short", "dash-dot")  # colours of the palette, then the next dash
 
@@ -65,6 +57,9 @@ def nth(index: int) -> Look:
     return Look(index, dash=DASHES[index // COLOURS % len(DASHES)])  # type: ignore[arg-type]  # one of the dashes
 
 
+# ---- marks ----------------------------------------------------------------------------------------------------------
+
+
 class Line(NamedTuple):
     """A curve or, without a dash, points; low, high: lengths of the bars of their uncertainty; steps: constant up to
     the next point; close: over a whole turn led on to its first value, of what may gain whole turns to that and as
@@ -88,7 +83,7 @@ class Line(NamedTuple):
 
 
 class Band(NamedTuple):
-    """An area between two curves."""
+    """An area between two curves; steps: they are constant up to the next point."""
 
     x: Array
     low: Array
@@ -96,16 +91,7 @@ class Band(NamedTuple):
     name: str | None = None
     look: Look = Look()
     close: bool = False
-
-
-class Stairs(NamedTuple):
-    """Counts between edges; window: the range of x in which they are seen."""
-
-    counts: Array
-    edges: Array
-    name: str | None = None
-    look: Look = Look()
-    window: tuple[float, float] | None = None
+    steps: bool = False
 
 
 class Bars(NamedTuple):
@@ -204,13 +190,10 @@ class Contours(NamedTuple):
     gaps: Sequence[tuple[str, str, NDArray[np.bool_]]] = ()
 
 
-def outside(peak: float, unit: str) -> Note:
-    """What stands in a chart whose peak is cut off."""
-    text = f"peak {quantity(peak, unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
-    return Note(text, 0.99, 0.97, "right", "top", boxed=True)
+Mark = Line | Band | Bars | Rule | Stripe | Arrow | Ring | Note | Contours
 
 
-Mark = Line | Band | Stairs | Bars | Rule | Stripe | Arrow | Ring | Note | Contours
+# ---- charts ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -218,46 +201,40 @@ class Axis:
     """An axis of a chart.
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
-    with names, which may be turned by so many degrees; integer: marked at whole numbers only; angles: at parts of a
-    turn; count: of its marks; powers: very large and small numbers by a common power of ten.
+    with names, which may be turned by so many degrees; angles: marked at parts of a turn; count: of its marks.
     """
 
     title: str = ""
     limits: tuple[float | None, float | None] = (None, None)
     places: Sequence[tuple[float, str]] | None = None
     log: bool = False
-    integer: bool = False
     angles: bool = False
     count: int = 0
     turned: float = 0.0
     margin: float | None = None
-    powers: bool = False
 
 
 class Legend(NamedTuple):
-    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries."""
+    """A legend above the chart: fewest entries, and the characters that a row has room for."""
 
-    most: int = 6
-    room: int = 90
     least: int = 2
-
-
-LEGEND = Legend()
+    room: int = 90
 
 
 @dataclass(frozen=True)
 class Chart:
     """Marks between two axes. over: the drive along x, instead of an axis; zero: with a line at y = 0; equal: both of
-    one scale, in a square; legend: None for none; title: above at the left, aside: above at the right."""
+    one scale, in a square; legend: None for none; title: above at the left, aside: above at the right; bare: without a
+    line and marks at the left."""
 
     x: Axis | Abscissa
     y: Axis
     marks: Sequence[Mark]
     zero: bool = False
-    legend: Legend | None = LEGEND
+    legend: Legend | None = Legend()  # noqa: RUF009  # immutable
     title: str = ""
     aside: str = ""
-    bare: bool = False  # without a line and marks at the left
+    bare: bool = False
     equal: bool = False
 
 
@@ -268,19 +245,24 @@ class Panel:
     title: str
     charts: Sequence[Chart]
     height: float = 3.5
-    parts: Sequence[float] = field(default=())
+    parts: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure: panels in rows of so many columns under a title; width in inches, 0 as the columns ask for; note: of
-    what is not drawn, beneath."""
+    """A figure: panels in rows of so many columns under a title.
+
+    width: in inches, 0 as the columns ask for; note: of what is not drawn, beneath; shared: the panels, of one chart
+    each, have common axes and one legend at the right; colours: what the colours of all charts mean.
+    """
 
     title: str
     panels: Sequence[Panel]
     columns: int = 1
     width: float = 0.0
     note: str = ""
+    shared: bool = False
+    colours: ColourScale | None = None
 
 
 def check_kind(kind: str, kinds: Iterable[str]) -> None:
@@ -289,6 +271,15 @@ def check_kind(kind: str, kinds: Iterable[str]) -> None:
         hint = nearest(kind, kinds)
         remedy = hint if hint.startswith("did") else f"use one of {', '.join(kinds)}"
         raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", remedy))
+
+
+# ---- curves over the drive ------------------------------------------------------------------------------------------
+
+
+def outside(most: float, unit: str) -> Note:
+    """What stands in a chart whose peak is cut off."""
+    text = f"peak {quantity(most, unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
+    return Note(text, 0.99, 0.97, "right", "top", boxed=True)
 
 
 def over_drive(
@@ -330,16 +321,8 @@ def over_drive(
 
 
 def silent(result: xr.Dataset, over: Abscissa, written: bool = True) -> list[Mark]:
-    """Stripes where positions have no answer, with each cause once; hatched where a pin loses contact.
-
-    Parameters
-    ----------
-    result : of one cycle
-    over : what it is drawn over
-    written : whether the causes are written
-    """
-    x, marks, causes = over.values, list[Mark](), set[str]()
-    half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
+    """Stripes where positions have no answer, each cause written once; hatched where a pin loses contact."""
+    x, half, marks, causes = over.values, over.half_step, list[Mark](), set[str]()
     lost = [run for run in intervals(result, Status.CONTACT_LOST) if run.status == Status.CONTACT_LOST]
     for run in [*lost, *intervals(result)]:
         low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))

@@ -1,4 +1,4 @@
-"""Views of a comparison: measured and model, per working condition and channel.
+"""Views of measured data: the tables of a measurement, and its comparison with a model, per condition and channel.
 
 What was measured is drawn with its expanded uncertainty U, the model as a curve. Gaps stay gaps.
 """
@@ -6,7 +6,7 @@ What was measured is drawn with its expanded uncertainty U, the model as a curve
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -19,6 +19,9 @@ from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, prefixed, with_uncertainty
 from trunnion.rig.comparison import CAUSES
 from trunnion.rig.judge import Verdict
+from trunnion.rig.reading.measurement import Measurement, rms
+from trunnion.views import sweep
+from trunnion.views.axis import Abscissa, Array, names, over_turn
 from trunnion.views.charts import (
     Axis,
     Band,
@@ -28,31 +31,92 @@ from trunnion.views.charts import (
     Look,
     Mark,
     Panel,
+    Plot,
     Stripe,
     check_kind,
     nth,
     silent,
-)
-from trunnion.views.common.cycle import Abscissa, Array, names, over_turn
-from trunnion.views.measured import shortened
+)  # fmt: skip
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
-from trunnion.views.scales import Scale, cause, edges
+from trunnion.views.sweep import Scale
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
-
-__all__ = ["KINDS", "MOST_DRAWN", "MOST_PANELS", "figure", "files", "of_file", "panels", "report",
-           "tables"]  # fmt: skip
 
 SIGNS = {"um": "µm", "deg": "°"}
 APART = 0.05  # of the range of a number: values nearer to each other are the same setting, each time a little off
 TRIFLE = 0.005  # of a number: less is no change of a setting
 KINDS = {"efficiency": "measured and modelled efficiency", "overlay": "signals with residuals"}
+MOST_CONDITIONS = 40  # of the table of a measurement
 MOST_PANELS = 6
 MOST_NAMED = 8  # curves that a legend tells apart
 MOST_DRAWN = 6  # conditions of a channel in the report
 MEASURED, MODEL = 0, 1
+RESIDUAL = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
+
+
+# ---- a measurement ------------------------------------------------------------------------------------------------
+
+
+def measurement_tables(measurement: Measurement) -> list[Table]:
+    """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
+    conditions, channels = measurement.conditions, list(measurement.channels)
+    units = {name: item.shown for name, item in measurement.channels.items()}  # of all files, whatever a file is in
+    speeds = np.isfinite([item.speed for item in conditions]).any()
+    head, short = shortened([item.name for item in conditions])
+    settings_of = [head] if head == "condition" else head.split(", ")
+    rows = []
+    for item, name in list(zip(conditions, short, strict=True))[:MOST_CONDITIONS]:
+        turns = max(course.turns.shape[0] for course in item.courses.values())
+        means = (_figure(_mean(item.courses[key].mean / units[key][1])) if key in item.courses else ""
+                 for key in channels)  # fmt: skip
+        rows.append([*([name] if head == "condition" else name.split(", ")), f"{turns:,}",
+                     *([f"{item.speed * 30 / np.pi:.5g}"] if speeds else []), *means])  # fmt: skip
+    heads = [*settings_of, "turns", *(["speed rpm"] if speeds else []),
+             *(f"{name} {_unit(units[name][0])}".strip() for name in channels)]  # fmt: skip
+    if len(conditions) > MOST_CONDITIONS:
+        rows.append([f"{len(conditions) - MOST_CONDITIONS} more", *[""] * (len(heads) - 1)])
+    made = [Table(f"{measurement.name}\nconditions: mean over turns and positions", heads, rows)]
+    rows = []
+    for name in channels:
+        courses = [item.courses[name] for item in conditions if name in item.courses]
+        unit, factor = courses[0].shown
+        every = np.concatenate([course.mean for course in courses]) / factor
+        finite = every[np.isfinite(every)]
+        extremes = [_figure(float(finite.min())), _figure(float(finite.max()))] if finite.size else ["none", "none"]
+        spreads = (rms(np.concatenate([getattr(course, figure) for course in courses])) / factor
+                   for figure in ("scatter", "uncertainty"))  # fmt: skip
+        rows.append([name, courses[0].measures, _unit(unit), *extremes, *(_figure(spread, 3) for spread in spreads)])
+    title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
+    return [*made, Table(title, ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"], rows)]
+
+
+def shortened(conditions: Sequence[str]) -> tuple[str, list[str]]:
+    """Head of a column and its entries: "misalignment, input.speed" and "0 deg, 250 rpm", …
+
+    A number keeps to its unit. Names that do not set the same numbers in the same order stay as they are, under
+    "condition".
+    """
+    rows = [[part.partition(" ") for part in name.split(", ")] for name in conditions]
+    keys = [[key for key, _, _ in row] for row in rows]
+    if not rows or any(row != keys[0] for row in keys) or not all(value for row in rows for _, _, value in row):
+        return "condition", list(conditions)
+    return ", ".join(keys[0]), [", ".join(value.replace(" ", "\u00a0") for _, _, value in row) for row in rows]
+
+
+def _mean(values: Array) -> float:
+    finite = values[np.isfinite(values)]
+    with np.errstate(over="ignore"):
+        return float(finite.mean()) if finite.size else np.nan
+
+
+def _figure(value: float, digits: int = 5) -> str:
+    return "unknown" if not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
+
+
+def _unit(unit: str) -> str:
+    """A unit that is not broken between lines."""
+    return "" if unit == "1" else unit.replace(" ", "\u00a0")
 
 
 # ---- settings and units -------------------------------------------------------------------------------------------
@@ -81,15 +145,15 @@ def levels(values: Array) -> Array:
         step = max(APART * float(np.ptp(rising)), TRIFLE * float(np.abs(rising).max()))
         group = np.searchsorted(rising[1:][np.diff(rising) > step], values, side="right")
         for k in np.unique(group):
-            members = (group == k) & np.isfinite(values)
-            means[members] = values[members].mean() if members.any() else np.nan
+            alike = (group == k) & np.isfinite(values)
+            means[alike] = values[alike].mean() if alike.any() else np.nan
     return means
 
 
 def varied(result: xr.Dataset) -> list[Scale]:
     """The numbers that were set to several values, that with the most first."""
-    counts_of = [(len(np.unique(levels(s.values)[np.isfinite(s.values)])), s) for s in settings(result)]
-    return [scale for count, scale in sorted(counts_of, key=lambda pair: -pair[0]) if count > 1]
+    sizes = [(len(np.unique(levels(scale.values)[np.isfinite(scale.values)])), scale) for scale in settings(result)]
+    return [scale for count, scale in sorted(sizes, key=lambda pair: -pair[0]) if count > 1]
 
 
 def label(result: xr.Dataset, condition: int) -> str:
@@ -103,19 +167,18 @@ def label(result: xr.Dataset, condition: int) -> str:
 
 def setting(value: float, unit: str) -> str:
     """What was set, with its unit: "15°", "62.83 rad/s"."""
+    return text(float(f"{value:.4g}"), unit, f"{float(f'{value:.4g}'):g}".replace("-", "−"))
+
+
+def text(value: float, unit: str, digits: str = "") -> str:
+    """A number with its unit, which is not scaled any more; digits: how it is written."""
     space = "" if unit in ("°", "") else "\u00a0"
-    return f"{float(f'{value:.4g}'):g}{space}{unit}".replace("-", "−").replace(" ", "\u00a0")
+    return f"{digits or number(float(value), 3)}{space}{unit}".replace(" ", "\u00a0")
 
 
 def coverage_of(result: xr.Dataset) -> str:
     """The probability that ±U covers, in words: "95 %"."""
     return f"{100 * float(result.attrs['probability']):.3g}".replace("95.4", "95") + "\u00a0%"
-
-
-def text(value: float, unit: str, digits: int = 3) -> str:
-    """A number with its unit, which is not scaled any more."""
-    space = "" if unit in ("°", "") else "\u00a0"
-    return f"{number(float(value), digits)}{space}{unit}".replace(" ", "\u00a0")
 
 
 def scale_of(result: xr.Dataset, channel: int, condition: int) -> tuple[float, str]:
@@ -145,33 +208,7 @@ def drive(result: xr.Dataset, condition: int) -> Abscissa:
 def tables(result: xr.Dataset) -> list[Table]:
     """Results, what would explain the residuals, and efficiencies, as there are."""
     first = results(result).titled(f"{result.attrs['comparing']}: measured minus model")
-    return [table for table in (first, explained(result), efficiencies(result)) if table is not None]
-
-
-RESIDUAL = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
-
-
-def results(result: xr.Dataset, channel: int | None = None) -> Table:
-    """Residual and verdict of every channel in every condition, or of one channel."""
-    turns = result["turns"].values
-    return _by_condition("results", RESIDUAL, result, channel,
-                         lambda i, k: _residual_cells(result, i, k) if turns[i, k] > 0 else [])  # fmt: skip
-
-
-def explained(result: xr.Dataset, channel: int | None = None) -> Table | None:
-    """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
-
-    def cells(i: int, k: int) -> list[str]:
-        causes = []
-        for kind in CAUSES:  # errors that would explain it, with the share that they explain
-            size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
-            factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
-            sized = f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
-            causes.append(sized if np.isfinite(size) else NONE)
-        return causes if any(cause != NONE for cause in causes) else []
-
-    table = _by_condition("what would explain the residual, each by itself", [*CAUSES], result, channel, cells)
-    return table if table.rows else None
+    return [first, *explained(result), *efficiencies(result)]
 
 
 def _by_condition(
@@ -188,6 +225,42 @@ def _by_condition(
     return Table(title, [first, *(["channel"] if channel is None else []), *head], rows)
 
 
+def results(result: xr.Dataset, channel: int | None = None) -> Table:
+    """Residual and verdict of every channel in every condition, or of one channel."""
+    keys = ("rms", "largest", "bias", "bias_expanded", "within", "within_least", "correlation", "largest_at")
+
+    def cells(i: int, k: int) -> list[str]:
+        if not result["turns"].values[i, k]:
+            return []
+        *sizes, wide, within, least, alike, at = (float(result[key].values[i, k]) for key in keys)
+        factor, unit = scale_of(result, i, k)
+        errors, largest, bias = (text(value * factor, unit) if np.isfinite(value) else NONE for value in sizes)
+        if np.isfinite(sizes[2] + wide):
+            bias = with_uncertainty(sizes[2] * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
+        turned, display_unit = prefixed(at, str(result.attrs["drive_unit"]))
+        place = setting(at * turned, display_unit) if np.isfinite(at) else NONE
+        shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
+        return [errors, largest, place, bias, *shares, _plain(alike), verdict(result, i, k)]
+
+    return _by_condition("results", RESIDUAL, result, channel, cells)
+
+
+def explained(result: xr.Dataset, channel: int | None = None) -> list[Table]:
+    """What would explain each residual beyond U: size and share, of all channels or of one; no table if nothing."""
+
+    def cells(i: int, k: int) -> list[str]:
+        causes = []
+        for kind in CAUSES:  # errors that would explain it, with the share that they explain
+            size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
+            factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
+            sized = f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
+            causes.append(sized if np.isfinite(size) else NONE)
+        return causes if any(cause != NONE for cause in causes) else []
+
+    table = _by_condition("what would explain the residual, each by itself", [*CAUSES], result, channel, cells)
+    return [table] if table.rows else []
+
+
 def verdicts(result: xr.Dataset) -> Table:
     """The verdict of every channel in every condition."""
     channels, (head, short) = names(result, "channel"), shortened(names(result, "condition"))
@@ -198,32 +271,17 @@ def verdicts(result: xr.Dataset) -> Table:
     return Table("verdicts", [head, *channels], rows)
 
 
-def _residual_cells(result: xr.Dataset, i: int, k: int) -> list[str]:
-    """RMS, largest residual and its place, bias, shares within ±U, correlation and verdict."""
-    keys = ("rms", "largest", "bias", "bias_expanded", "within", "within_least", "correlation", "largest_at")
-    *sizes, wide, within, least, alike, at = (float(result[key].values[i, k]) for key in keys)
-    factor, unit = scale_of(result, i, k)
-    rms, largest, bias = (text(value * factor, unit) if np.isfinite(value) else NONE for value in sizes)
-    if np.isfinite(sizes[2] + wide):
-        bias = with_uncertainty(sizes[2] * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
-    turned, display_unit = prefixed(at, str(result.attrs["drive_unit"]))
-    place = setting(at * turned, display_unit) if np.isfinite(at) else NONE
-    shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
-    return [rms, largest, place, bias, *shares, _plain(alike), verdict(result, i, k)]
-
-
-def efficiencies(result: xr.Dataset) -> Table | None:
-    """Measured efficiency with U beside the model's; None if it was not measured."""
+def efficiencies(result: xr.Dataset) -> list[Table]:
+    """Measured efficiency with U beside the model's; no table if it was not measured."""
     if "efficiency" not in result:
-        return None
+        return []
     words = {1: "within", 0: "not within", -1: "unknown"}
     first, short = shortened(names(result, "condition"))
-    measured, wide, model = (result[f"efficiency{part}"].values for part in ("", "_expanded", "_model"))
-    columns = zip(short, measured, wide, model, result["efficiency_within"].values, strict=True)
+    keys = ("efficiency", "efficiency_expanded", "efficiency_model", "efficiency_within")
     rows = [[name, _plain(m), _plain(u), _plain(c), _plain(m - c), words[int(within)]]
-            for name, m, u, c, within in columns]  # fmt: skip
+            for name, m, u, c, within in zip(short, *(result[key].values for key in keys), strict=True)]  # fmt: skip
     head = [first, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
-    return Table("efficiency", head, rows)
+    return [Table("efficiency", head, rows)]
 
 
 def _plain(value: float) -> str:
@@ -232,8 +290,7 @@ def _plain(value: float) -> str:
 
 def conditions(result: xr.Dataset) -> Table:
     """What was set in every condition, in how many turns it was measured, and where the data are."""
-    scales, sources = settings(result), attribute(result, "condition_files")
-    rows = []
+    scales, sources, rows = settings(result), attribute(result, "condition_files"), []
     for k, name in enumerate(names(result, "condition")):
         values = [setting(s.values[k], s.unit) if np.isfinite(s.values[k]) else NONE for s in scales]
         turns = result["turns"].values[:, k]
@@ -252,25 +309,168 @@ def sensors(result: xr.Dataset) -> Table:
         cells = []
         for what in ("zero", "gain"):
             values = result[f"accuracy_{what}"].values[i]
-            ends = [float(np.nanmin(values)), float(np.nanmax(values))] if np.isfinite(values).any() else []
-            in_unit = [(1 / size, read) if read and size != 1 else prefixed(end, unit) for end in ends]
-            scales = in_unit if what == "zero" else [(100.0, "%")] * 2
-            texts = [
-                text(end * factor, sign) if end else "0" for end, (factor, sign) in zip(ends, scales, strict=False)
-            ]
+            texts = []
+            for end in [np.nanmin(values), np.nanmax(values)] if np.isfinite(values).any() else []:
+                factor, sign = (100.0, "%") if what == "gain" else prefixed(float(end), unit)
+                if what == "zero" and read and size != 1:
+                    factor, sign = 1 / size, read
+                texts.append(text(end * factor, sign) if end else "0")
             cells.append(" to ".join(dict.fromkeys(texts)) or NONE)
         rows.append([name, measures[i], "" if (read or unit) == "1" else read or unit, *cells])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
 
 
-def files(result: xr.Dataset, key: str = "files") -> Table | None:
-    """The files of the data with their size and hash; None if none is known. key: of the attribute that has them."""
-    rows = [
-        [row["file"], NONE if row["bytes"] is None else f"{row['bytes']:,}".replace(",", "\u202f"),
-         row["sha256"] or NONE]
-        for row in attribute(result, key)
-    ]  # fmt: skip
-    return Table("files", ["file", "bytes", "SHA-256"], rows) if rows else None
+# ---- figures ------------------------------------------------------------------------------------------------------
+
+
+def figure(
+    result: xr.Dataset, kind: str | None = None, channel: str | None = None, condition: str | None = None
+) -> Plot:
+    """One figure.
+
+    Parameters
+    ----------
+    result : of a comparison
+    kind : of KINDS; the efficiency if it was measured and no channel is named, else the courses
+    channel, condition : which courses; the first MOST_PANELS of them if there are more
+
+    Raises
+    ------
+    MechanismError : for a name or kind that there is not, and where there is nothing to draw
+    """
+    kind = kind or ("efficiency" if "efficiency" in result and channel is None and condition is None else "overlay")
+    check_kind(kind, KINDS)
+    if kind == "efficiency":
+        if "efficiency" not in result:
+            remedy = "measure effort: and rate: of the driver, load: and rate: of a load's joint"
+            raise MechanismError(Finding("the efficiency was not measured", "--kind efficiency", remedy))
+        return Plot("Efficiency, measured and model", [Panel("", [efficiency(result)], 3.75)])
+    charts = measured_courses(result, channel, condition)
+    if not charts:
+        remedy = "see the findings of `trunnion data`"
+        raise MechanismError(Finding("there is no signal to draw", "--kind overlay", remedy))
+    more = f", {MOST_PANELS} of {len(charts)} signals" if len(charts) > MOST_PANELS else ""
+    return Plot(f"Measured and model{more}", [course(result, i, k, 80) for i, k in charts[:MOST_PANELS]], 2)
+
+
+def measured_courses(
+    result: xr.Dataset, channel: str | None = None, condition: str | None = None
+) -> list[tuple[int, int]]:
+    """(channel, condition) of the courses that there are, of one channel or condition only if it is named."""
+    picked = []
+    for dim, name in (("channel", channel), ("condition", condition)):
+        every = names(result, dim)
+        if name is not None and name not in every:
+            raise MechanismError(Finding(f"there is no {dim} '{name}'", f"--{dim}", nearest(name, every)))
+        picked.append(range(len(every)) if name is None else [every.index(name)])
+    any_value = np.isfinite(result["measured"].values).any(axis=2) | np.isfinite(result["model"].values).any(axis=2)
+    return [(i, k) for k in picked[1] for i in picked[0] if any_value[i, k]]
+
+
+def efficiency(result: xr.Dataset) -> Chart:
+    """Measured efficiency with bars of ±U beside the model's, over what was varied; a curve for each combination of
+    further numbers, over the conditions if there are too many."""
+    count, by_number = result.sizes["condition"], Scale("condition", "", np.arange(1.0, result.sizes["condition"] + 1))
+    over, *others = varied(result) or [by_number]
+    keys = np.array([np.nan_to_num(levels(scale.values), nan=np.inf) for scale in others]).reshape(-1, count)
+    combined = np.unique(keys, axis=1).T if others else np.empty((1, 0))
+    if len(combined) > MOST_NAMED:
+        over, others, keys, combined = by_number, [], keys[:0], np.empty((1, 0))
+    x, marks = over.values, list[Mark]()
+    model, measured, wide = (result[f"efficiency{part}"].values for part in ("_model", "", "_expanded"))
+    for k, at in enumerate(combined):
+        where = np.flatnonzero((keys == at[:, None]).all(axis=0) & np.isfinite(x))
+        where = where[np.argsort(x[where], kind="stable")]
+        settings_at = (f"{scale.name} = {setting(value, scale.unit)}" for scale, value in zip(others, at, strict=True))
+        look, half = nth(k) if others else Look(MODEL), np.nan_to_num(wide[where])
+        dash = look.dash if over is not by_number else "none"  # conditions are in no order
+        marks += [
+            Line(x[where], model[where], ", ".join(["model", *settings_at]), look.but(dash=dash, mark="_", size=13.0)),
+            Line(x[where], measured[where], None if k else f"measured, ±U ({coverage_of(result)})",
+                 Look(look.colour if others else MEASURED, dash="none", mark="o", order=3), half, half),
+        ]  # fmt: skip
+    at = levels(x)
+    places = np.unique(at[np.isfinite(at)])
+    sides = Scale("", "", places).edges(places, 0.05) if places.size else np.empty(0)
+    limits = (sides[0], sides[-1]) if places.size else (None, None)
+    sampled = np.isfinite(result["phase"].values)
+    for k, place in enumerate(places):  # grey where no condition has an answer of the model, with the cause
+        if not np.isfinite(model[here := at == place]).any():
+            gravest = int(result["status"].values[here][sampled[here]].max())
+            why = sweep.CAUSES[gravest] if gravest >= Status.NOT_CONVERGED else "no efficiency"
+            marks.append(Stripe(sides[k], sides[k + 1], f"model: {why}"))
+    titles = names(result, "condition")
+    named = over is by_number and count <= 24 and max(map(len, titles)) <= 24
+    across = Axis(over.title, limits, list(zip(by_number.values.tolist(), titles, strict=True)) if named else None,
+                  turned=60 if named and sum(map(len, titles)) > 70 else 0)  # fmt: skip
+    return Chart(across, Axis("efficiency"), marks, legend=Legend(1))
+
+
+def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel:
+    """Measured with ±U and model; below, the residual in ±U. room: characters of the title in a line."""
+    over, (factor, unit) = drive(result, condition), scale_of(result, channel, condition)
+    x, count, name = over.values, over.values.size, names(result, "channel")[channel]
+    measured, wide, model, residual, compared = (
+        np.asarray(result[key].values[channel, condition, :count], float)
+        for key in ("measured", "expanded", "model", "residual", "compared")
+    )
+    measured, wide, model, residual = (values * factor for values in (measured, wide, model, residual))
+    residual = np.where(compared > 0, residual, np.nan)
+    close, band = unit != "°", Look(MEASURED, alpha=0.22, order=1.8)
+    cycle = result.isel(condition=condition, position=slice(0, count))
+    above = [
+        Band(x, measured - wide, measured + wide, f"±U ({coverage_of(result)})", band, close),
+        Line(x, measured, "measured", Look(MEASURED, 1.3), close=close),
+        Line(x, model, "model", Look(MODEL, 1.5, "long"), close=close),
+        *silent(cycle, over),
+    ]
+    below = [
+        Band(x, -wide, wide, None, band, True),
+        Line(x, residual, None, Look(MEASURED, 1.1), close=True),
+        *silent(cycle, over, written=False),
+    ]
+    peak = np.nanmax(np.abs(np.append(measured, model)), initial=0.0)
+    flat = np.nanmax(np.abs(np.append(residual, wide)), initial=0.0) < 1e-6 * peak  # nothing to look at closer
+    limits = (-1e-3 * peak, 1e-3 * peak) if flat else (None, None)
+    error, part = (float(result[key].values[channel, condition]) for key in ("rms", "within"))
+    words = [f"RMS {text(error * factor, unit)}"] if np.isfinite(error) else []
+    words += [f"{number(100 * part, 3)}\u00a0% within ±U"] if np.isfinite(part) else []
+    aside = ": ".join(filter(None, [", ".join(words), verdict(result, channel, condition)]))
+    charts = [
+        Chart(over, Axis(f"{name} [{unit}]" if unit else name), above, legend=Legend(1, 70)),
+        Chart(over, Axis(f"residual\n[{unit}]" if unit else "residual", limits), below, True, None, aside=aside),
+    ]
+    return Panel("\n".join(wrap(label(result, condition), room)[:2]), charts, 3.3, (2.6, 1.0))
+
+
+# ---- report -------------------------------------------------------------------------------------------------------
+
+
+def report(result: xr.Dataset) -> str:
+    """The whole report as HTML, to be filed."""
+    parts = [Section("Efficiency", pictures=[(KINDS["efficiency"], figure(result, "efficiency"))], after=[table])
+             for table in efficiencies(result)]  # fmt: skip
+    about = f"Expanded uncertainty U of the mean over the turns, {coverage_of(result)} coverage (JCGM 100:2008); the " \
+            "model counts as exact."  # fmt: skip
+    parts += [Section("Verdicts", about, tables=[verdicts(result)]), Section("Conditions", tables=[conditions(result)]),
+              Section("Sensors", tables=[sensors(result)])]  # fmt: skip
+    for i, name in enumerate(names(result, "channel")):
+        compared = [k for _, k in measured_courses(result, name)]
+        within = np.nan_to_num(result["within"].values[i], nan=2.0)
+        drawn = sorted(sorted(compared, key=within.__getitem__)[:MOST_DRAWN])
+        unit = str(attribute(result, "channel_units")[i])
+        about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
+        if len(drawn) < len(compared):
+            about += f"; {len(drawn)} of {len(compared)} conditions are drawn, those with the least within ±U"
+        pictures = [(f"{name}, {label(result, k)}", Plot("", [course(result, i, k, 62)], width=5.2)) for k in drawn]
+        parts.append(Section(name, about, pictures, [results(result, i), *explained(result, i)], small=True,
+                             calm="" if pictures else "No signal."))  # fmt: skip
+    sizes = counts(*((result.sizes[dim], dim) for dim in ("condition", "channel", "position")))
+    return page(
+        result, "Comparison of a model with a measurement", [of_model(result), *sizes], parts,
+        summary=headline(result), signed=True, end=[data_section(result, "files")],
+        name=str(result.attrs["comparing"]) or "Measurement", about_data=about_data(result),
+    )  # fmt: skip
 
 
 def headline(result: xr.Dataset) -> Summary:
@@ -289,179 +489,9 @@ def headline(result: xr.Dataset) -> Summary:
     return summary
 
 
-# ---- figures ------------------------------------------------------------------------------------------------------
-
-
-def figure(
-    result: xr.Dataset, kind: str | None = None, channel: str | None = None, condition: str | None = None
-) -> Figure:
-    """One figure.
-
-    Parameters
-    ----------
-    result : of a comparison
-    kind : of KINDS; the efficiency if it was measured and no channel is named, else the courses
-    channel, condition : which courses; the first MOST_PANELS of them if there are more
-
-    Raises
-    ------
-    MechanismError : for a name or kind that there is not, and where there is nothing to draw
-    """
-    from trunnion.views.draw import figure as draw
-
-    measured = "efficiency" in result
-    kind = kind or ("efficiency" if measured and channel is None and condition is None else "overlay")
-    check_kind(kind, KINDS)
-    if kind == "efficiency":
-        if not measured:
-            remedy = "measure effort: and rate: of the driver, load: and rate: of a load's joint"
-            raise MechanismError(Finding("the efficiency was not measured", "--kind efficiency", remedy))
-        chart = efficiency(result)
-        return draw("Efficiency, measured and model", result, [Panel("", [chart], 3.75)])
-    charts = panels(result, channel, condition)
-    if not charts:
-        remedy = "see the findings of `trunnion data`"
-        raise MechanismError(Finding("there is no signal to draw", "--kind overlay", remedy))
-    more = f", {MOST_PANELS} of {len(charts)} signals" if len(charts) > MOST_PANELS else ""
-    courses = [course(result, i, k, 80) for i, k in charts[:MOST_PANELS]]
-    return draw(f"Measured and model{more}", result, courses, columns=2)
-
-
-def panels(result: xr.Dataset, channel: str | None = None, condition: str | None = None) -> list[tuple[int, int]]:
-    """(channel, condition) of the courses that there are, of one channel or condition only if it is named."""
-    picked = []
-    for dim, name in (("channel", channel), ("condition", condition)):
-        every = names(result, dim)
-        if name is not None and name not in every:
-            raise MechanismError(Finding(f"there is no {dim} '{name}'", f"--{dim}", nearest(name, every)))
-        picked.append(range(len(every)) if name is None else [every.index(name)])
-    measured_channels = np.isfinite(result["measured"].values).any(axis=2) | np.isfinite(result["model"].values).any(
-        axis=2
-    )
-    return [(i, k) for k in picked[1] for i in picked[0] if measured_channels[i, k]]
-
-
-def efficiency(result: xr.Dataset) -> Chart:
-    """Measured efficiency with bars of ±U beside the model's, over what was varied; a curve for each combination of
-    further numbers, over the conditions if there are too many."""
-    count, (several, by_number) = result.sizes["condition"], (varied(result), Scale("condition", "", np.empty(0)))
-    over, *others = several or [by_number]
-    keys = np.array([np.nan_to_num(levels(scale.values), nan=np.inf) for scale in others]).reshape(-1, count)
-    combined = np.unique(keys, axis=1).T if others else np.empty((1, 0))
-    if len(combined) > MOST_NAMED:
-        over, others, keys, combined = by_number, [], keys[:0], np.empty((1, 0))
-    x = over.values if over.values.size else np.arange(1.0, count + 1)
-    model, measured, wide = (result[f"efficiency{part}"].values for part in ("_model", "", "_expanded"))
-    marks, order = list[Mark](), np.argsort(x, kind="stable")
-    for k, at in enumerate(combined):
-        where = order[(keys == at[:, None]).all(axis=0)[order] & np.isfinite(x[order])]
-        parts = (f"{scale.name} = {setting(value, scale.unit)}" for scale, value in zip(others, at, strict=True))
-        look, half = nth(k) if others else Look(MODEL), np.nan_to_num(wide[where])
-        dash = look.dash if over is not by_number else "none"  # conditions are in no order
-        marks += [
-            Line(x[where], model[where], ", ".join(["model", *parts]), look.but(dash=dash, mark="_", size=13.0)),
-            Line(x[where], measured[where], None if k else f"measured, ±U ({coverage_of(result)})",
-                 Look(look.colour if others else MEASURED, dash="none", mark="o", order=3), half, half),
-        ]  # fmt: skip
-    stripes, limits = _unanswered(result, x)
-    conditions = names(result, "condition")
-    named = over is by_number and count <= 24 and max(map(len, conditions)) <= 24
-    across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(conditions)] if named else None,
-                  turned=60 if named and sum(map(len, conditions)) > 70 else 0)  # fmt: skip
-    return Chart(across, Axis("efficiency"), [*marks, *stripes], legend=Legend(least=1))
-
-
-def _unanswered(result: xr.Dataset, x: Array) -> tuple[list[Mark], tuple[float | None, float | None]]:
-    """Stripes where no condition has an answer of the model, with the cause; and the ends of the axis."""
-    model, status, at = result["efficiency_model"].values, result["status"].values, levels(x)
-    sampled, places = np.isfinite(result["phase"].values), np.unique(at[np.isfinite(at)])
-    if not places.size:
-        return [], (None, None)
-    sides, marks = edges(Scale("", "", places), places, 0.05), list[Mark]()
-    for k, place in enumerate(places):
-        here = at == place
-        if not np.isfinite(model[here]).any():
-            gravest = int(status[here][sampled[here]].max())
-            why = cause(gravest) if gravest >= Status.NOT_CONVERGED else "no efficiency"
-            marks.append(Stripe(sides[k], sides[k + 1], f"model: {why}"))
-    return marks, (float(sides[0]), float(sides[-1]))
-
-
-def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel:
-    """Measured with ±U and model; below, the residual in ±U. room: characters of the title in a line."""
-    over, (factor, unit) = drive(result, condition), scale_of(result, channel, condition)
-    x, count = over.values, over.values.size
-    measured, wide, model, residual, compared = (
-        np.asarray(result[key].values[channel, condition, :count], float)
-        for key in ("measured", "expanded", "model", "residual", "compared")
-    )
-    measured, wide, model = measured * factor, wide * factor, model * factor
-    residual = np.where(compared > 0, residual, np.nan) * factor
-    close, band, name = unit != "°", Look(MEASURED, alpha=0.22, order=1.8), names(result, "channel")[channel]
-    cycle = result.isel(condition=condition, position=slice(0, count))
-    above: list[Mark] = [
-        Band(x, measured - wide, measured + wide, f"±U ({coverage_of(result)})", band, close),
-        Line(x, measured, "measured", Look(MEASURED, 1.3), close=close),
-        Line(x, model, "model", Look(MODEL, 1.5, "long"), close=close),
-        *silent(cycle, over),
-    ]
-    below: list[Mark] = [
-        Band(x, -wide, wide, None, band, True),
-        Line(x, residual, None, Look(MEASURED, 1.1), close=True),
-        *silent(cycle, over, written=False),
-    ]
-    peak = np.nanmax(np.abs(np.append(measured, model)), initial=0.0)
-    flat = np.nanmax(np.abs(np.append(residual, wide)), initial=0.0) < 1e-6 * peak  # nothing to look at closer
-    limits = (-1e-3 * peak, 1e-3 * peak) if flat else (None, None)
-    rms, part = (float(result[key].values[channel, condition]) for key in ("rms", "within"))
-    words = [f"RMS {text(rms * factor, unit)}"] if np.isfinite(rms) else []
-    words += [f"{number(100 * part, 3)}\u00a0% within ±U"] if np.isfinite(part) else []
-    aside = ": ".join(filter(None, [", ".join(words), verdict(result, channel, condition)]))
-    charts = [
-        Chart(over, Axis(f"{name} [{unit}]" if unit else name), above, legend=Legend(room=70, least=1)),
-        Chart(over, Axis(f"residual\n[{unit}]" if unit else "residual", limits), below, True, None, aside=aside),
-    ]
-    return Panel("\n".join(wrap(label(result, condition), room)[:2]), charts, 3.3, (2.6, 1.0))
-
-
-# ---- report -------------------------------------------------------------------------------------------------------
-
-
-def report(result: xr.Dataset) -> str:
-    """The whole report as HTML, to be filed."""
-    from trunnion.views.draw import figure as draw
-
-    parts = []
-    table = efficiencies(result)
-    if table is not None:
-        parts.append(Section("Efficiency", pictures=[(KINDS["efficiency"], figure(result, "efficiency"))],
-                             after=[table]))  # fmt: skip
-    about = f"Expanded uncertainty U of the mean over the turns, {coverage_of(result)} coverage (JCGM 100:2008); the " \
-            "model counts as exact."  # fmt: skip
-    parts += [Section("Verdicts", about, tables=[verdicts(result)])]
-    parts += [Section(one.title.capitalize(), tables=[one]) for one in (conditions(result), sensors(result))]
-    for i, name in enumerate(names(result, "channel")):
-        compared = [k for _, k in panels(result, name)]
-        within = np.nan_to_num(result["within"].values[i], nan=2.0)
-        drawn = sorted(sorted(compared, key=lambda k, within=within: within[k])[:MOST_DRAWN])  # type: ignore[misc]
-        unit = str(attribute(result, "channel_units")[i])
-        about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
-        if len(drawn) < len(compared):
-            about += f"; {len(drawn)} of {len(compared)} conditions are drawn, those with the least within ±U"
-        pictures = [
-            (f"{name}, {label(result, k)}", draw("", result, [course(result, i, k, 62)], width=5.2)) for k in drawn
-        ]
-        why = explained(result, i)
-        parts.append(Section(name, about, pictures, [results(result, i), *([why] if why else [])], small=True,
-                             calm="" if pictures else "No signal."))  # fmt: skip
-    model = str(result.attrs["name"]) or "model"
-    facts = [(model, f"model {result.attrs['model_hash']}"),
-             *counts(*((result.sizes[dim], dim) for dim in ("condition", "channel", "position")))]  # fmt: skip
-    return page(
-        result, "Comparison of a model with a measurement", facts, parts, summary=headline(result), signed=True,
-        end=[data_section(result, "files")],
-        name=str(result.attrs["comparing"]) or "Measurement", about_data=about_data(result),
-    )  # fmt: skip
+def of_model(result: xr.Dataset) -> tuple[str, str]:
+    """The model among the facts of a page."""
+    return str(result.attrs["name"]) or "model", f"model {result.attrs.get('model_hash', '')}"
 
 
 def about_data(result: xr.Dataset) -> int:
@@ -471,12 +501,13 @@ def about_data(result: xr.Dataset) -> int:
 
 def data_section(result: xr.Dataset, key: str) -> Section:
     """What was done with the data, their files and the findings about them. key: of the attribute with the files."""
-    table = files(result, key)
-    rows = [of_file(row) for row in attribute(result, "data_findings")]
-    return Section("Data", lines=attribute(result, "done"), tables=[table] if table else [], findings=rows,
+    files = [
+        [row["file"], NONE if row["bytes"] is None else f"{row['bytes']:,}".replace(",", "\u202f"),
+         row["sha256"] or NONE]
+        for row in attribute(result, key)
+    ]  # fmt: skip
+    table = [Table("files", ["file", "bytes", "SHA-256"], files)] if files else []
+    rows = [{**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}
+            for row in attribute(result, "data_findings")]  # fmt: skip
+    return Section("Data", lines=attribute(result, "done"), tables=table, findings=rows,
                    calm="No findings about the data.", anchor="data")  # fmt: skip
-
-
-def of_file(row: dict[str, str]) -> dict[str, str]:
-    """A finding about data with the name of its file."""
-    return {**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}

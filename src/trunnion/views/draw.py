@@ -1,115 +1,145 @@
-"""Charts drawn by matplotlib: `figure` as panels under a title, `grid` side by side on common axes."""
+"""Charts drawn by matplotlib, in one look for all figures: sizes, palette, axes, legends, names in drawings.
+
+Only the object-oriented interface is used, so figures can be made in any thread and leave no global state.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import io
+import os
+import re
+import warnings
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps, patches, ticker
+from matplotlib import colormaps, patches, rc_context, ticker
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
+from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.text import Text
 
+from trunnion.errors import Finding, MechanismError
+from trunnion.files import whole
 from trunnion.views import charts
-from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Note, Panel, Rule
-from trunnion.views.common.cycle import Abscissa, Array
-from trunnion.views.common.figures import (
-    INK,
-    MUTED,
-    PALETTE,
-    RULE,
-    SHADE,
-    WIDTH,
-    Labels,
-    along,
-    dress,
-    legend,
-    new,
-    plain,
-)
+from trunnion.views.axis import Abscissa, Array
+from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Legend, Line, Look, Mark, Note, Plot, Rule
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.backend_bases import RendererBase
+    from matplotlib.text import Annotation
 
-__all__ = ["figure", "grid"]
-
-COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
+INK, MUTED, RULE, SHADE, LIMIT, PALE = "#1b1f24", "#5d6670", "#d9dde2", "#eceef1", "#a1260d", "#b9c3cd"
+COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": LIMIT, "pale": PALE}
+# Okabe and Ito's colours, which people with any colour vision tell apart; yellow is left out, it fades on white.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
                           "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 2, 1.5, 2)),
                           "none": "none"}  # fmt: skip
 BANDED = colormaps["viridis"]
 # without the end that fades on white
 RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
+WIDTH = 7.4
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
+# fonts for the scripts that matplotlib's own lacks; those that are installed are asked in this order
+FONTS = ("DejaVu Sans", "Noto Sans CJK SC", "Noto Sans CJK JP", "Noto Sans SC", "Noto Sans JP", "Noto Sans KR",
+         "Microsoft YaHei", "Yu Gothic", "Malgun Gothic", "PingFang SC", "Hiragino Sans", "WenQuanYi Zen Hei",
+         "Droid Sans Fallback", "Noto Sans Devanagari", "Noto Sans Thai", "Arial Unicode MS")  # fmt: skip
+CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
+FORMATS = ("png", "svg", "pdf", "jpg", "jpeg")
 
 
-# ---- figures ------------------------------------------------------------------------------------------------------
+# ---- sheets ---------------------------------------------------------------------------------------------------------
 
 
-def figure(
-    title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int = 1, width: float = 0.0, note: str = ""
-) -> Figure:
-    """Panels in rows of so many columns under a title; the charts of a panel below one another.
+class Sheet(Figure):
+    """A figure whose texts find their signs in whichever of the installed fonts has them."""
 
-    Parameters
-    ----------
-    title : of the whole figure, also of the only panel
-    result : whose mechanism is named beneath
-    panels : what is drawn, row by row
-    columns : panels side by side
-    width : inches; that of all figures, or of a page of several columns, if 0
-    note : of what is not drawn, beneath
-    """
-    columns = min(columns, len(panels))
-    rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
-    heights = [max(panel.height for panel in row) for row in rows]
-    sheet = new(title, result, 0.55 + sum(heights), width or PAGE[columns])
-    parts, labels = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights).ravel(), Labels(sheet)
-    for place, panel in zip(parts, panels, strict=False):
-        if not panel.charts:  # of a measure that lacks this figure
-            continue
-        if panel.title and len(panels) > 1:
-            place.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
-        ratios = list(panel.parts) or [1.0] * len(panel.charts)
-        stacked = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-        for axes, spec in zip(stacked, panel.charts, strict=True):
-            _chart(axes, spec, min(1.0, sheet.get_figwidth() / columns / WIDTH))
-            if axes is not stacked[-1]:
-                axes.set_xlabel("")
-                axes.tick_params(labelbottom=False)
-            for mark in spec.marks:
-                if isinstance(mark, Note) and mark.beside:
-                    labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
-    labels.place()
-    if note:
-        sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
+    def draw(self, renderer: RendererBase) -> None:
+        """Give every text the fonts, then draw; a sign that no font has is a box."""
+        for text in self.findobj(Text):
+            text.set_fontfamily(list(families()))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph")
+            super().draw(renderer)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows; matplotlib does this only for figures that pyplot has made."""
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=100)
+        return buffer.getvalue()
+
+
+@cache
+def families() -> tuple[str, ...]:
+    """The fonts to look in, in order."""
+    installed = {font.name for font in fontManager.ttflist}
+    return tuple(name for name in FONTS if name in installed)
+
+
+def plain(text: str) -> str:
+    """A text that matplotlib shows as it is: `$` starts no formula, a leading `_` hides no legend entry."""
+    text = CONTROL.sub(" ", text).replace("$", r"\$")
+    return f"\u2009{text}" if text.startswith("_") else text
+
+
+def new(title: str, result: xr.Dataset, height: float = 4.3, width: float = WIDTH) -> Figure:
+    """An empty figure with its title, of one line or more, and, smaller, the name of the mechanism."""
+    layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.03, wspace=0.04)
+    sheet = Sheet(figsize=(width, height), dpi=150, facecolor="white", layout=layout)
+    FigureCanvasAgg(sheet)
+    sheet.suptitle(plain(title), x=0.012, ha="left", fontsize=12, fontweight="bold", color=INK)
+    if name := str(result.attrs.get("name", "")):
+        sheet.supxlabel(plain(name), x=0.99, ha="right", fontsize=7.5, color=MUTED)
     return sheet
 
 
-def grid(
-    title: str, result: xr.Dataset, specs: Sequence[Chart], columns: int, colours: ColourScale | None = None
-) -> Figure:
-    """Charts with common axes in rows, titled along the outer ones; their legend and the scale of colours at the right.
+def figure(result: xr.Dataset, plot: Plot) -> Figure:
+    """A plot as a figure, with the name of the mechanism of the result beneath."""
+    columns = min(plot.columns, len(plot.panels)) or 1
+    rows = [plot.panels[k : k + columns] for k in range(0, len(plot.panels), columns)]
+    heights = [max(panel.height for panel in row) for row in rows]
+    above = 0.55 + 0.2 * plot.title.count("\n")
+    sheet = new(plot.title, result, above + sum(heights), plot.width or PAGE.get(columns, PAGE[3]))
+    labels = Labels(sheet)
+    if plot.shared:
+        _shared(sheet, plot, columns)
+    else:
+        wide = min(1.0, sheet.get_figwidth() / columns / WIDTH)  # of the width of all figures
+        parts = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights).ravel()
+        for part, panel in zip(parts, plot.panels, strict=False):
+            if not panel.charts:  # of a measure that lacks this figure
+                continue
+            if panel.title and len(plot.panels) > 1:
+                part.suptitle(plain(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
+            ratios = list(panel.parts) or [1.0] * len(panel.charts)
+            stacked = part.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+            for axes, spec in zip(stacked, panel.charts, strict=True):
+                _chart(axes, spec, labels, wide)
+                if axes is not stacked[-1]:
+                    axes.set_xlabel("")
+                    axes.tick_params(labelbottom=False)
+    labels.place()
+    if plot.note:
+        sheet.text(0.012, 0.005, plain(plot.note), fontsize=7.5, color=MUTED)
+    return sheet
 
-    Parameters
-    ----------
-    title : of the whole figure, of one line or more
-    result : whose mechanism is named beneath
-    specs : what is drawn, row by row
-    columns : charts side by side
-    colours : what the colours of all charts mean
-    """
-    rows = -(-len(specs) // columns)
-    height = (4.0 if rows == 1 else 0.9 + 2.1 * rows) + 0.2 * title.count("\n")
-    sheet = new(title, result, height, WIDTH if len(specs) == 1 else 9.4)
-    places = sheet.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel().tolist()
+
+def _shared(sheet: Figure, plot: Plot, columns: int) -> None:
+    """Charts with common axes, titled along the outer ones; their legend and the scale of colours at the right."""
+    specs = [panel.charts[0] for panel in plot.panels]
+    places = sheet.subplots(-(-len(specs) // columns), columns, sharex=True, sharey=True, squeeze=False).ravel()
     named: dict[str, Any] = {}
     for k, (axes, spec) in enumerate(zip(places, specs, strict=False)):
-        _chart(axes, spec if len(specs) == 1 else replace(spec, legend=None))
+        _chart(axes, spec if len(specs) == 1 else replace(spec, legend=None), Labels(sheet))
         lowest, leftmost = k + columns >= len(specs), k % columns == 0
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)
         axes.set_xlabel(axes.get_xlabel() if lowest else "")
@@ -120,65 +150,80 @@ def grid(
     if len(specs) > 1 and named:
         sheet.legend(list(named.values()), list(named), loc="outside right upper", frameon=False, fontsize=8.5,
                      labelcolor=INK)  # fmt: skip
-    if colours is not None:
-        risen = ScalarMappable((LogNorm if colours.log else Normalize)(colours.low, colours.high), RISING)
-        bar = sheet.colorbar(_bands(colours) if colours.levels else risen, ax=places[: len(specs)], pad=0.02, aspect=30,
-                             ticks=colours.levels or None)  # fmt: skip
+    if (colours := plot.colours) is not None:
+        scale = _bands(colours) if colours.levels else ScalarMappable(
+            (LogNorm if colours.log else Normalize)(colours.low, colours.high), RISING)  # fmt: skip
+        bar = sheet.colorbar(scale, ax=list(places[: len(specs)]), pad=0.02, aspect=30, ticks=colours.levels or None)
         bar.set_label(plain(colours.title), fontsize=9, color=INK)
         bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
         bar.outline.set_visible(False)
-    return sheet
-
-
-def _bands(scale: ColourScale) -> ScalarMappable:
-    """The colours of bands between levels, with more at either end where a number is beyond."""
-    below, above = scale.low < scale.levels[0], scale.high > scale.levels[-1]
-    extend: Any = "both" if below and above else "min" if below else "max" if above else "neither"
-    return ScalarMappable(BoundaryNorm(scale.levels, BANDED.N, extend=extend), BANDED)
 
 
 # ---- a chart ------------------------------------------------------------------------------------------------------
 
 
-def _chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
+def _chart(axes: Axes, spec: Chart, labels: Labels, wide: float = 1.0) -> None:
     """A chart on axes; wide: of the width of all figures, which its legend has room in."""
+    dress(axes, spec.x.title, spec.y.title)
     if isinstance(spec.x, Abscissa):
-        along(axes, spec.x, _lines(spec.y.title), zero=spec.zero)
+        _along(axes, spec.x)
     else:
-        dress(axes, _lines(spec.x.title), _lines(spec.y.title))
         _axis(axes, "x", spec.x)
-        if spec.zero:
-            axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+    if spec.zero:
+        axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
     if spec.equal:
         axes.set_aspect("equal", adjustable="box" if spec.y.limits[0] is not None else "datalim")
     _axis(axes, "y", spec.y)
-    for mark in sorted(spec.marks, key=lambda mark: isinstance(mark, Rule)):
-        if isinstance(mark, Rule):
-            _limits(axes, spec)
-            name, (low, high) = None if mark.name is None else plain(mark.name), sorted(axes.get_xlim())
-            if not mark.upright:
-                axes.axhline(mark.at, label=name, **_stroke(mark.look))
-            elif low <= mark.at <= high:  # in view: the limits must stand
-                axes.axvline(mark.at, label=name, **_stroke(mark.look))
-        elif isinstance(mark, Line):
-            _line(mark, axes, spec)
-        elif isinstance(mark, Contours):
-            _contours(mark, axes)
-        else:
+    for mark in spec.marks:
+        if isinstance(mark, Note) and mark.beside:
+            labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
+        elif not isinstance(mark, Rule):
             _mark(mark, axes, spec)
+    _limits(axes, spec)
+    for mark in (mark for mark in spec.marks if isinstance(mark, Rule)):
+        name, (low, high) = None if mark.name is None else plain(mark.name), sorted(axes.get_xlim())
+        if not mark.upright:
+            axes.axhline(mark.at, label=name, **_stroke(mark.look))
+        elif low <= mark.at <= high:  # in view: the limits must stand
+            axes.axvline(mark.at, label=name, **_stroke(mark.look))
     _limits(axes, spec)
     if spec.bare:
         axes.spines["left"].set_visible(False)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
-    axes.set_title(_lines(spec.title), fontsize=8.5, color=INK, loc="left")
+    axes.set_title(plain(spec.title), fontsize=8.5, color=INK, loc="left")
     axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
     if spec.legend is not None:
-        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least)
+        _legend(axes, spec.legend, wide)
 
 
-def _lines(text: str) -> str:
-    return "\n".join(map(plain, text.split("\n")))
+def dress(axes: Axes, x: str = "", y: str = "") -> None:
+    """Quiet axes: a light grid below the curves, a frame left and below only, labels with units."""
+    axes.set_axisbelow(True)
+    axes.grid(True, color=RULE, linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set(color=MUTED, linewidth=0.8)
+    axes.tick_params(colors=MUTED, labelcolor=INK, labelsize=8.5, width=0.8, length=3.5)
+    axes.tick_params(which="minor", length=2, width=0.6, color=MUTED)
+    axes.set_xlabel(plain(x), fontsize=9, color=INK)
+    axes.set_ylabel(plain(y), fontsize=9, color=INK)
+
+
+def _along(axes: Axes, over: Abscissa) -> None:
+    """An axis over the drive: whole degrees at round angles, limits at the ends of the run."""
+    span = over.span
+    if over.unit == "°" and span >= 90:
+        step = next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720)
+        axes.xaxis.set_major_locator(ticker.MultipleLocator(step))
+    elif over.unit == "":
+        axes.xaxis.set_major_locator(ticker.MaxNLocator(integer=True))
+    axes.xaxis.set_minor_locator(ticker.AutoMinorLocator(2))
+    if over.values.size == 1:  # one position, one tick
+        axes.set_xticks([float(over.values[0])])
+        axes.set_xticks([], minor=True)
+    elif span > 0:
+        low = float(over.values.min() if over.period >= 0 else over.values.max() + over.period)
+        axes.set_xlim(low, low + span)
 
 
 def _axis(axes: Axes, name: str, axis: Axis) -> None:
@@ -193,14 +238,9 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
             label.set(rotation=axis.turned, ha="right", rotation_mode="anchor")
     elif axis.angles:
         side.set_major_locator(ticker.MaxNLocator(nbins=8, steps=[1, 1.5, 3, 4.5, 9, 10]))
-    elif axis.count or axis.integer:
-        side.set_major_locator(ticker.MaxNLocator(integer=axis.integer, nbins=axis.count or 6))
+    elif axis.count:
+        side.set_major_locator(ticker.MaxNLocator(nbins=axis.count))
         axes.ticklabel_format(axis=name, useOffset=False)  # type: ignore[arg-type]  # "x" or "y"
-    if axis.powers:
-        form = ticker.ScalarFormatter(useMathText=True)
-        form.set_powerlimits((-4, 6))
-        side.set_major_formatter(form)
-        side.get_offset_text().set(fontsize=8, color=MUTED)
 
 
 def _limits(axes: Axes, spec: Chart) -> None:
@@ -212,6 +252,20 @@ def _limits(axes: Axes, spec: Chart) -> None:
             low, high = axis.limits
             if low is not None or high is not None:
                 (axes.set_xlim if name == "x" else axes.set_ylim)(low, high)
+
+
+def _legend(axes: Axes, legend: Legend, wide: float) -> None:
+    """A legend in rows above the axes, where it hides no curve."""
+    handles, texts = axes.get_legend_handles_labels()
+    if len(handles) < legend.least:
+        return
+    room, longest = int(wide * legend.room), max(map(len, texts))
+    fits = sum(map(len, texts)) + 7 * len(texts) <= room  # with the line samples
+    columns = len(texts) if fits else max(1, (room + 10) // (longest + 7))
+    axes.legend(
+        handles, texts, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
+        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,
+    )  # fmt: skip
 
 
 # ---- marks --------------------------------------------------------------------------------------------------------
@@ -237,11 +291,10 @@ def _stroke(look: Look) -> dict[str, Any]:
 
 def _area(look: Look) -> dict[str, Any]:
     """The look of an area; hatched instead of filled where it has a hatch and a rule for a colour."""
-    if look.hatch and look.colour in ("rule", "shade"):
-        return {"facecolor": "none", "edgecolor": COLOURS["rule"], "hatch": look.hatch, "linewidth": 0,
-                "zorder": look.order}  # fmt: skip
-    hatch = {"hatch": look.hatch} if look.hatch else {}
-    return {"facecolor": _colour(look.colour), "alpha": look.alpha, "linewidth": 0, "zorder": look.order, **hatch}
+    hollow = bool(look.hatch) and look.colour in ("rule", "shade")
+    paint = {"facecolor": "none", "edgecolor": RULE} if hollow else {"facecolor": _colour(look.colour),
+                                                                     "alpha": look.alpha}  # fmt: skip
+    return {**paint, **({"hatch": look.hatch} if look.hatch else {}), "linewidth": 0, "zorder": look.order}
 
 
 def _closed(spec: Chart, x: Array, close: bool, *rows: Array, turn: float = 0.0) -> list[Array]:
@@ -253,9 +306,9 @@ def _closed(spec: Chart, x: Array, close: bool, *rows: Array, turn: float = 0.0)
     return [np.append(x, x[0] + spec.x.period), *ends]
 
 
-def _line(mark: Line, axes: Axes, spec: Chart) -> None:
+def _line(mark: Line, axes: Axes, spec: Chart, label: str | None) -> None:
     """A curve or points."""
-    style, label = _stroke(mark.look), None if mark.name is None else plain(mark.name)
+    style = _stroke(mark.look)
     x, y = _closed(spec, mark.x, mark.close, np.asarray(mark.y, float), turn=mark.turn)
     if mark.low is not None and mark.high is not None:
         axes.errorbar(x, y, [mark.low, mark.high], label=label, capsize=3, elinewidth=1.1,
@@ -264,11 +317,10 @@ def _line(mark: Line, axes: Axes, spec: Chart) -> None:
     if mark.shares is not None:
         pieces = np.stack([np.stack([x[:-1], y[:-1]], 1), np.stack([x[1:], y[1:]], 1)], 1)
         paints = RISING((mark.shares[:-1] + mark.shares[1:]) / 2)
-        lines = LineCollection(list(pieces), colors=paints, linewidths=mark.look.width, zorder=mark.look.order)
-        axes.add_collection(lines)
+        axes.add_collection(LineCollection(list(pieces), colors=paints, linewidths=mark.look.width,
+                                           zorder=mark.look.order))  # fmt: skip
         return
-    drawstyle: dict[str, Any] = {"drawstyle": "steps-post"} if mark.steps else {}
-    axes.plot(x, y, label=label, solid_joinstyle="round", **style, **drawstyle)
+    axes.plot(x, y, label=label, solid_joinstyle="round", drawstyle="steps-post" if mark.steps else "default", **style)
     finite = np.isfinite(y)
     alone = finite & ~np.append(False, finite[:-1]) & ~np.append(finite[1:], False)
     if alone.any() and not mark.look.mark:  # a single position makes no line; a dashed curve's dots are open
@@ -277,26 +329,19 @@ def _line(mark: Line, axes: Axes, spec: Chart) -> None:
 
 
 def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
-    """An area, a shape or a text."""
+    """A mark of any kind but a rule, and a note that is placed at the end."""
     name = getattr(mark, "name", None)
-    named: dict[str, Any] = {"label": None if name is None else plain(name)}
+    label = None if name is None else plain(name)
     match mark:
+        case Line():
+            _line(mark, axes, spec, label)
         case charts.Band(x, low, high):
             x, low, high = _closed(spec, x, mark.close, low, high)
-            axes.fill_between(x, low, high, **named, **_area(mark.look))
-        case charts.Stairs(counts, edges):
-            bars = axes.stairs(
-                counts, edges, fill=True, color=_colour(mark.look.colour), zorder=mark.look.order, **named
-            )
-            if mark.window is not None:
-                start, end = mark.window
-                height = 2 * float(counts.max())
-                clip = patches.Rectangle((start, 0), max(end - start, 0.0), height, transform=axes.transData)
-                bars.set_clip_path(clip)
+            axes.fill_between(x, low, high, label=label, step="post" if mark.steps else None, **_area(mark.look))
         case charts.Bars(at, sizes, thickness):
-            axes.barh(at, sizes, thickness, color=_colour(mark.look.colour), zorder=mark.look.order, **named)
+            axes.barh(at, sizes, thickness, color=_colour(mark.look.colour), zorder=mark.look.order, label=label)
         case charts.Stripe(start, end, text):
-            axes.axvspan(start, end, **named, **_area(mark.look))
+            axes.axvspan(start, end, label=label, **_area(mark.look))
             middle = np.sqrt(start * end) if axes.get_xscale() == "log" else (start + end) / 2
             if text:
                 axes.text(middle, 0.5, plain(text), transform=axes.get_xaxis_transform(), rotation=90, ha="center",
@@ -313,13 +358,22 @@ def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
             }  # fmt: skip
             square = patches.Rectangle((x0 - r, y0 - r), 2 * r, 2 * r, **shape)
             axes.add_patch(square if mark.square else patches.Circle((x0, y0), r, **shape))
-        case Note(text, x0, y0) if not mark.beside:  # else when all else is there
+        case Note(text, x0, y0):
             box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
             axes.annotate(
-                _lines(text), (x0, y0), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
+                plain(text), (x0, y0), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
                 textcoords="offset points", ha=mark.across, va=mark.up, fontsize=mark.size,
                 color=_colour(mark.colour), zorder=4, bbox=box if mark.boxed else None,
             )  # fmt: skip
+        case Contours():
+            _contours(mark, axes)
+
+
+def _bands(scale: ColourScale) -> ScalarMappable:
+    """The colours of bands between levels, with more at either end where a number is beyond."""
+    below, above = scale.low < scale.levels[0], scale.high > scale.levels[-1]
+    extend: Any = "both" if below and above else "min" if below else "max" if above else "neither"
+    return ScalarMappable(BoundaryNorm(scale.levels, BANDED.N, extend=extend), BANDED)
 
 
 def _contours(mark: Contours, axes: Axes) -> None:
@@ -341,3 +395,120 @@ def _contours(mark: Contours, axes: Axes) -> None:
         fill = "none" if np.isfinite(mark.values[where]).all() else SHADE  # a number that is known is seen
         axes.add_collection(PolyCollection(boxes, facecolors=fill, edgecolors=MUTED, hatch=hatch, linewidths=0,
                                            label=plain(name), zorder=1.5), autolim=False)  # fmt: skip
+
+
+# ---- names in a drawing --------------------------------------------------------------------------------------------
+
+SIDES = np.array([[np.cos(angle), np.sin(angle)] for angle in np.radians(np.arange(0, 360, 15))])
+GAPS = (5.0, 8.0, 12.0, 18.0, 26.0)  # points from the place to the name
+FURTHER = 0.07  # what a gap more costs, beside the share of the name's box that is not empty
+DARK = 3.0  # pale bodies count almost as much as lines
+LEAST = 6.0  # points around every place that are its joint's, however pale its symbol is
+EMPTY = 1.5  # points around a name
+CROSSED, CUT, STRAY = 5.0, 100.0, 0.4  # costs of lying on another name, outside the figure, nearer to another place
+
+
+@dataclass
+class Labels:
+    """The names of one figure: added while it is drawn, placed when all else is there.
+
+    The figure is painted once without names; what is dark there is in the way. So a name keeps off links, springs,
+    ground, arrows, curves and titles alike, whatever draws them.
+    """
+
+    figure: Figure
+    waiting: list[tuple[Annotation, float]] = field(default_factory=list)
+
+    def add(
+        self, axes: Axes, text: str, place: Array, size: float = 10.0, symbol: float = 0.0, weight: str = "bold"
+    ) -> None:
+        """A name of a place in the coordinates of the axes. size: of its letters, points; symbol: half width of what is
+        drawn there, in the same coordinates."""
+        if not np.all(np.isfinite(place)):
+            return
+        note = axes.annotate(
+            plain(text), (place[0], place[1]), xytext=(0, 0), textcoords="offset points", ha="center", va="center",
+            fontsize=size, fontweight=weight, color=INK, zorder=8, annotation_clip=False, visible=False,
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
+        )  # fmt: skip
+        note.set_in_layout(False)  # which it would change
+        self.waiting.append((note, symbol))
+
+    def place(self) -> None:
+        """Move every name to where it covers least of what is drawn, and of the names before it."""
+        if not self.waiting:
+            return
+        canvas, scale = FigureCanvasAgg(self.figure), self.figure.dpi / 72
+        canvas.draw()  # type: ignore[no-untyped-call]
+        pixels = np.asarray(canvas.buffer_rgba())[::-1, :, :3]  # type: ignore[no-untyped-call]  # rows from below
+        dark = np.clip(DARK * (1 - pixels.min(axis=2) / 255), 0, 1)
+        edge, spots = np.array(dark.shape)[::-1], list[Array]()
+        for note, symbol in self.waiting:
+            ends = note.axes.transData.transform(np.add([note.xy] * 2, [(0.0, 0.0), (symbol, 0.0)]))  # type: ignore[union-attr]
+            spots.append(ends[0])
+            _fill(dark, ends[0], max(LEAST * scale, float(np.hypot(*(ends[1] - ends[0])))), 1.0)
+        for k, (note, _) in enumerate(self.waiting):
+            note.set_visible(True)
+            extent = _extent(note)
+            half = 0.5 * extent + EMPTY * scale
+            others, best = np.array(spots[:k] + spots[k + 1 :]).reshape(-1, 2), (np.inf, np.zeros(2))
+            for far, gap in enumerate(GAPS):
+                for side in SIDES:
+                    offset = gap * scale * side + half * side / np.abs(side).max()
+                    low, high = (np.rint(spots[k] + offset + sign * half).astype(int) for sign in (-1, 1))
+                    beyond = bool(np.any((low < 0) | (high > edge)))
+                    stray = bool(np.any(np.linalg.norm(spots[k] + offset - others, axis=1) < np.hypot(*offset)))
+                    box = dark[max(low[1], 0) : max(high[1], 1), max(low[0], 0) : max(high[0], 1)]
+                    cost = (box.mean() if box.size else 1.0) + FURTHER * far + CUT * beyond + STRAY * stray
+                    best = min(best, (float(cost), offset), key=lambda pair: pair[0])
+            note.set_position(tuple(best[1] / scale))
+            _fill(dark, spots[k] + best[1], half, CROSSED)
+
+
+def _extent(note: Annotation) -> Array:
+    """Width and height of a name, pixels."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")
+        box = note.get_window_extent()
+    return np.array([box.width, box.height])
+
+
+def _fill(dark: Array, middle: Array, half: Array | float, value: float) -> None:
+    """Make a box of the pixels dark."""
+    low, high = (np.maximum(np.rint(middle + sign * half).astype(int), 0) for sign in (-1, 1))
+    dark[low[1] : high[1], low[0] : high[0]] = value
+
+
+# ---- files --------------------------------------------------------------------------------------------------------
+
+
+def check_figure(path: Path) -> str:
+    """The format that a figure would be written in, by the extension; MechanismError if it is none."""
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in FORMATS:
+        raise MechanismError(Finding("is no kind of figure", str(path), "end the name in .png, .svg, .pdf or .jpg"))
+    return kind
+
+
+def save(drawing: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure by its extension, whole or not at all; the same figure gives the same file.
+
+    Raises MechanismError for another extension than .png, .svg, .pdf and .jpg, and where it cannot be written.
+    """
+    target = Path(path)
+    kind = check_figure(target)
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    made = io.BytesIO()  # written by Python: where the disk is full, matplotlib's PDF raises what is no OSError
+    with whole(target) as draft:
+        with rc_context({"svg.hashsalt": "trunnion"}):
+            drawing.savefig(made, format=kind, dpi=200, metadata=undated)
+        draft.write_bytes(made.getbuffer())
+    return target
+
+
+def svg(drawing: Figure, salt: str = "trunnion") -> str:
+    """A figure as the text of an SVG file; salt: what makes its ids."""
+    text = io.StringIO()
+    with rc_context({"svg.hashsalt": salt}):
+        drawing.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()

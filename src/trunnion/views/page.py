@@ -1,19 +1,20 @@
 """The one page of all studies, and what every HTML report has: findings, input data, and where it is from.
 
-Every figure is an SVG inside the page. The content security policy allows these and the one style, named by its hash,
-and nothing else, so no name in a model can become code.
+Every figure is an SVG inside the page. The content security policy names the one style, and the one script of a page
+that moves, by their hashes, and allows nothing else, so no name in a model can become code.
 """
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import posixpath
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from html import escape
-from io import BytesIO
+from importlib.resources import files
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -21,22 +22,20 @@ from trunnion.errors import agreeing
 from trunnion.model.names import is_number
 from trunnion.results.attributes import attribute, summary_of, units_of
 from trunnion.results.figure import MORE_THAN
-from trunnion.results.figure import Figure as Stated
-from trunnion.results.quantities import Units, quantity
-from trunnion.views.common.bundle import web_text
+from trunnion.results.quantities import quantity
+from trunnion.views.charts import Plot
 
 if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
-    from matplotlib.figure import Figure
-
-__all__ = [
-    "NONE", "Section", "Summary", "Table", "counts", "hashed", "headline", "inputs_of", "page", "said", "source",
-    "template", "value_of", "with_code",
-]  # fmt: skip
-
 
 NONE = "—"  # a cell whose number is not known
+CODE = re.compile(r"`([^`]+)`")
+FIGURE = re.compile(r"(?<=\d) (?=\S+$)")  # between the number of a place and its unit
+Summary = Sequence[tuple[str, list[tuple[str, str]]]]
+
+
+# ---- tables and sections --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -62,14 +61,6 @@ class Table:
         return replace(self, head=[self.head[k] for k in filled], rows=rows)
 
 
-CODE = re.compile(r"`([^`]+)`")
-
-
-def with_code(text: str) -> str:
-    """The text escaped for HTML, with `…` as code: "see `trunnion play`" has no backtick left."""
-    return CODE.sub(r"<code>\1</code>", escape(str(text)))
-
-
 @dataclass(frozen=True)
 class Section:
     """A part of the page, in this order: what it is about, lines, tables, pictures, further tables, findings.
@@ -82,7 +73,7 @@ class Section:
 
     title: str
     about: str = ""
-    pictures: Sequence[tuple[str, Figure]] = ()
+    pictures: Sequence[tuple[str, Plot]] = ()
     tables: Sequence[Table] = ()
     after: Sequence[Table] = ()
     small: bool = False
@@ -90,10 +81,6 @@ class Section:
     findings: Sequence[dict[str, str]] = ()
     calm: str = ""
     anchor: str = ""
-
-
-FIGURE = re.compile(r"(?<=\d) (?=\S+$)")  # between the number of a place and its unit
-Summary = Sequence[tuple[str, list[tuple[str, str]]]]
 
 
 def page(
@@ -123,22 +110,35 @@ def page(
     about_data : findings about the data, to which the page leads where there is no other
     signed : with room for names and dates
     """
-    style = web_text("report.css") + web_text("page.css")
-    text = said(result, style)
+    text = said(result, web_text("report.css") + web_text("page.css"))
     text["findings"] = [row for row in text["findings"] if row not in missed]
-    context: dict[str, Any] = {
-        "kicker": kicker, "name": name or str(result.attrs.get("name", "")) or "Mechanism",
-        "formula": str(result.attrs.get("formula", "")), "facts": facts, "summary": summary, "missed": missed,
-        "sections": [_drawn(part) for part in parts], "end": [_drawn(part) for part in end],
-        "inputs": inputs_of(result) if "inputs" in result.attrs else [], "about_data": about_data, "signed": signed,
-        **text,
-    }  # fmt: skip
-    return template("page.html.j2").render(context)
+    drawn = [[{**asdict(replace(part, pictures=())), "pictures": _drawn(result, part)} for part in some]
+             for some in (parts, end)]  # fmt: skip
+    return template("page.html.j2").render(
+        kicker=kicker, name=name or str(result.attrs.get("name", "")) or "Mechanism",
+        formula=str(result.attrs.get("formula", "")), facts=facts, summary=summary, missed=missed,
+        sections=drawn[0], end=drawn[1], inputs=inputs_of(result) if "inputs" in result.attrs else [],
+        about_data=about_data, signed=signed, **text,
+    )  # fmt: skip
+
+
+def _drawn(result: xr.Dataset, part: Section) -> list[dict[str, str]]:
+    return [{"alt": alt, "source": source(result, plot)} for alt, plot in part.pictures]
+
+
+def source(result: xr.Dataset, plot: Plot) -> str:
+    """A plot as an address that holds its figure."""
+    from trunnion.views.draw import figure, svg
+
+    return "data:image/svg+xml;base64," + base64.b64encode(svg(figure(result, plot)).encode()).decode()
 
 
 def counts(*pairs: tuple[int, str]) -> list[tuple[str, str]]:
     """Facts of a page: (12, "position") as ("12", "positions")."""
     return [(f"{count:,}".replace(",", "\u202f"), agreeing(count, what, what + "s")) for count, what in pairs]
+
+
+# ---- what every report has ------------------------------------------------------------------------------------------
 
 
 @cache
@@ -154,20 +154,9 @@ def template(name: str) -> Template:
     return environment.get_template(name)
 
 
-def _drawn(part: Section) -> dict[str, Any]:
-    """A part as the page takes it: its figures as addresses that hold them."""
-    pictures = [{"alt": alt, "source": source(figure)} for alt, figure in part.pictures]
-    return {**vars(part), "pictures": pictures}
-
-
-def source(figure: Figure) -> str:
-    """A figure as an address that holds it."""
-    from matplotlib import rc_context
-
-    buffer = BytesIO()
-    with rc_context({"svg.hashsalt": "trunnion"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
+def with_code(text: str) -> str:
+    """The text escaped for HTML, with `…` as code: "see `trunnion play`" has no backtick left."""
+    return CODE.sub(r"<code>\1</code>", escape(str(text)))
 
 
 def said(result: xr.Dataset, style: str, findings: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
@@ -191,29 +180,26 @@ def hashed(text: str) -> str:
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
-def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
+def headline(result: xr.Dataset) -> Summary:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "maximum, at 24°")])."""
+    units, subjects = units_of(result), []
     rows = [row for row in summary_of(result) if not row.numerical]
-    units = units_of(result)
-    return [
-        (subject, [(value_of(row, units), FIGURE.sub("\u00a0", row.remark)) for row in members])
-        for subject, members in groupby(rows, key=lambda row: row.subject)
-    ]
-
-
-def value_of(row: Stated, units: Units) -> str:
-    """A figure with its unit, in those of its page."""
-    text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit, units) or "—"
-    return f"> {text}" if row.aspect == MORE_THAN else text
+    for subject, rows_of in groupby(rows, key=lambda row: row.subject):
+        figures = []
+        for row in rows_of:
+            text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit, units) or NONE
+            figures.append((f"> {text}" if row.aspect == MORE_THAN else text, FIGURE.sub("\u00a0", row.remark)))
+        subjects.append((subject, figures))
+    return subjects
 
 
 def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
     """Input rows by section of the model, the first name of their path: a plain number with its SI unit, a text as it
     was written, an expression with what it comes to."""
     sections = []
-    for section, members in groupby(attribute(result, "inputs"), key=lambda row: str(row["path"]).split(".")[0]):
+    for section, rows in groupby(attribute(result, "inputs"), key=lambda row: str(row["path"]).split(".")[0]):
         lines = []
-        for row in members:
+        for row in rows:
             text, value, unit = str(row.get("text") or ""), row.get("value"), str(row.get("unit") or "")
             unit = "" if unit in ("1", "SI") else unit  # a dimension is a length or an angle, as its own text says
             if not text:
@@ -225,3 +211,85 @@ def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
             lines.append({"path": str(row["path"]).removeprefix(f"{section}."), "text": text})
         sections.append((section.replace("_", " ").capitalize(), lines))
     return sections
+
+
+# ---- our ES modules as one ------------------------------------------------------------------------------------------
+
+# A page opened from a file may not import files, and a browser spends some 10 ms on each. So each module becomes a
+# function of its own scope that returns what it exports, an import the unpacking of that. Only the forms that our
+# modules use are known: `import { a, b as c }` or `import * as a` `from "./x.js";`, `export function | const | class`.
+IMPORT = re.compile(r'^import (\{[^}]*\}|\* as \w+|\w+) from "([^"]+)";$', re.MULTILINE)
+EXPORT = re.compile(r"^export (?=(?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
+LEFT_OVER = re.compile(r"^\s*(?:import|export)\b|\bimport\s*\(", re.MULTILINE)
+
+Read = Callable[[str], str]
+
+
+def web_text(name: str) -> str:
+    """A file of `views/web` as text."""
+    return (files("trunnion.views") / "web" / name).read_text(encoding="utf-8")
+
+
+def bundle(entry: str, read: Read = web_text) -> str:
+    """The module `entry` ("report.js") and all it imports as one script, in the order of dependence."""
+    functions = _functions(entry, read, ())
+    for name, text in functions.items():
+        if "</" in text or "<!--" in text:
+            raise _refusal(name)
+    return '"use strict";\n' + "\n".join(functions.values())
+
+
+def module(entry: str, read: Read, libraries: Collection[str]) -> str:
+    """The module `entry` ("studio/main.js") and all it imports as one module; `libraries` stay imports.
+
+    It exports each by the name of its path, `module_studio_main`.
+    """
+    functions = _functions(entry, read, libraries)
+    imports = [f'import * as {_variable(name)} from "{name}";' for name in libraries]
+    return "\n".join([*imports, *functions.values(), f"export {{ {', '.join(map(_variable, functions))} }};\n"])
+
+
+def _functions(entry: str, read: Read, libraries: Collection[str]) -> dict[str, str]:
+    """Every module as a function, by its path without .js, after those that it imports."""
+    done: dict[str, str] = {}
+
+    def collect(name: str, path: tuple[str, ...]) -> None:
+        if name in path:
+            raise ValueError(f"modules import each other: {' → '.join([*path, name])}")
+        if name not in done:
+            source = read(f"{name}.js")
+            for what, other in IMPORT.findall(source):
+                if other.startswith(".") and not what.isidentifier():
+                    collect(_beside(name, other), (*path, name))
+            done[name] = _as_function(name, source, libraries)
+
+    collect(entry.removesuffix(".js"), ())
+    return done
+
+
+def _as_function(name: str, source: str, libraries: Collection[str]) -> str:
+    def unpacked(match: re.Match[str]) -> str:
+        what, other = match.groups()
+        if other not in libraries and (what.isidentifier() or not other.startswith(".")):
+            return match[0]
+        named = {"{": what.replace(" as ", ": "), "*": what.split()[-1]}.get(what[0], f"{{ default: {what} }}")
+        return f"const {named} = {_variable(other if other in libraries else _beside(name, other))};"
+
+    exported = EXPORT.findall(source)
+    body = IMPORT.sub(unpacked, EXPORT.sub("", source))
+    if LEFT_OVER.search(body):
+        raise _refusal(name)
+    return f"const {_variable(name)} = (() => {{\n{body}return {{ {', '.join(exported)} }};\n}})();\n"
+
+
+def _refusal(name: str) -> ValueError:
+    return ValueError(f"{name}.js cannot be put into a page: unknown import or export, or the text `</` or `<!--`")
+
+
+def _beside(name: str, other: str) -> str:
+    """What a module imports, by its path without .js."""
+    return posixpath.normpath(posixpath.join(posixpath.dirname(name), other)).removesuffix(".js")
+
+
+def _variable(name: str) -> str:
+    return "module_" + re.sub(r"\W", "_", name)

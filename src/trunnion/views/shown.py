@@ -1,30 +1,35 @@
-"""A result of any kind as a report or a figure: which view it has."""
+"""A result of any kind as a figure, a report or the HTML of a notebook: which view it has."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
 from importlib import import_module
 from inspect import signature
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.model.arguments import check_keywords, strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import whole
+from trunnion.results.attributes import findings_of, summary_of, whole
+from trunnion.results.figure import MORE_THAN
+from trunnion.results.quantities import readable
 from trunnion.results.tables import kind_of
+from trunnion.views.charts import Plot
 from trunnion.views.charts import check_kind as one_of
+from trunnion.views.page import with_code
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from trunnion.views.cycle.report import Animation
 
-__all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report", "report_of"]
-
-# kind of result: the modules in which its `figure` and its `report` stand; loaded when they are asked for, for
-# matplotlib is slow to import
+# kind of result: the modules in which its `figure` and its `report` stand; loaded when they are asked for
 VIEWS = {
     "cycle": ("cycle.plots", "cycle.report"), "motion": ("motion.figure", "motion.report"),
     "sweep": ("sweep", "sweep"), "play": ("play", "play"), "assembly": ("assembly.figure", "assembly.figure"),
@@ -66,13 +71,20 @@ def report_of(result: xr.Dataset, **options: Any) -> str:
 
 def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
-    view, call = _view(result, "figure"), f"plot() of a {kind_of(result)}"
-    if kind is None:
-        return _called(getattr(view, "sheet", view.figure), call, result, options)  # type: ignore[no-any-return]
-    if "kind" not in signature(view.figure).parameters:
+    view = _view(result, "figure")
+    if kind is not None and "kind" not in signature(view.figure).parameters:
         what, remedy = f"a result of {kind_of(result)} has one figure", "leave the kind out"
         raise MechanismError(Finding(what, "kind", remedy))
-    return _called(view.figure, call, result, {"kind": kind, **options})  # type: ignore[no-any-return]
+    given = options if kind is None else {"kind": kind, **options}
+    made = _called(view.figure, f"plot() of a {kind_of(result)}", result, given)
+    return drawn(result, made) if isinstance(made, Plot) else made  # a drawing of the mechanism
+
+
+def drawn(result: xr.Dataset, made: Plot) -> Figure:
+    """A plot drawn by matplotlib, which is slow to import."""
+    from trunnion.views.draw import figure
+
+    return figure(result, made)
 
 
 def _called(view: Callable[..., Any], call: str, result: xr.Dataset, options: Mapping[str, Any]) -> Any:
@@ -86,12 +98,7 @@ def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> A
     """The moving mechanism of a cycle."""
     if kind_of(result) != "cycle":
         raise MechanismError(Finding(f"there is no animation of a {kind_of(result)}", "kind", "analyse a cycle"))
-    return _view(result, "animation").animation(result, ideal, height)  # type: ignore[no-any-return]
-
-
-def html_of(result: xr.Dataset) -> str:
-    """What a notebook shows of a result of any kind."""
-    return str(import_module("trunnion.views.notebook").result_html(result))
+    return _view(result, "report").animation(result, ideal, height)  # type: ignore[no-any-return]
 
 
 def check_kind(of: str, kind: str) -> None:
@@ -106,3 +113,92 @@ def _view(result: xr.Dataset, what: str) -> Any:
         remedy = f"there are {what}s of {', '.join(VIEWS)}"
         raise MechanismError(Finding(f"there is no {what} of a {kind_of(result)}", "kind", remedy))
     return import_module(f"trunnion.views.{VIEWS[kind_of(result)][what != 'figure']}")
+
+
+# ---- notebooks ------------------------------------------------------------------------------------------------------
+
+LOOKED_AT = 36  # positions over which findings are looked for: a notebook must not wait
+MOST_FIGURES, MOST_FINDINGS = 40, 12  # of a summary
+COLOURS = {"error": "#a1260d", "warning": "#8a4b00", "note": "#5a636e"}
+CELL = "text-align:left;padding:1px 12px 1px 0;vertical-align:top"
+
+
+def mechanism_figure(mechanism: Mechanism) -> Figure:
+    """The mechanism at the first position of its cycle that can be assembled; MechanismError if there is none."""
+    from trunnion.cycle.analyse import drawable
+    from trunnion.views.cycle.plots import mechanism as drawing
+
+    result = drawable(mechanism)
+    points = result["point_position"].values
+    finite = np.flatnonzero(np.isfinite(points).all(axis=tuple(range(points.ndim - 1))))
+    return drawing(result, index=int(finite[0]) if finite.size else 0)
+
+
+def mechanism_html(mechanism: Mechanism) -> str:
+    """Name, parts, structural formula, mobility, drawing and findings, without a script.
+
+    What cannot be told of a mechanism that cannot be assembled or driven is left out, and its findings say why: a
+    notebook shows what it is given, and an error here would hide the value itself.
+    """
+    from trunnion.cycle.inspect import check
+    from trunnion.views.draw import svg
+
+    kinds = Counter(joint.type for joint in mechanism.effective_joints.values())
+    joints = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    driven = f"driven at {', '.join(mechanism.drivers)}" if mechanism.drivers else "not driven"
+    sizes = f"{len(mechanism.effective_links)} links · {sum(kinds.values())} joints ({joints})"
+    facts, findings, body = [escape(f"{mechanism.space} · {sizes} · {driven}")], list[Finding](), ""
+    try:
+        checked = check(mechanism, LOOKED_AT)
+        facts.append(f"<code>{escape(checked.formula)}</code>, mobility {checked.mobility}")
+        findings = list(checked.findings)
+        text = svg(mechanism_figure(mechanism), salt=mechanism.digest)  # its ids apart from those of other drawings
+        body = f'<div style="max-width:640px">{text[text.index("<svg") :]}</div>'
+    except MechanismError as error:
+        findings = findings or list(error.findings)  # that there is nothing to draw, the findings have said better
+    except Exception as error:  # what else may go wrong is told too, and by the next call that is asked for an answer
+        findings.append(Finding(f"it cannot be shown whole: {type(error).__name__}: {error}"))
+    return _html(mechanism.name or "Mechanism", facts, body, findings)
+
+
+def result_html(result: xr.Dataset) -> str:
+    """Name, kind and size of a result, the figures that one looks at first, and its findings."""
+    telling = ("position", "measure", "parameter", "condition", "channel")  # of how large a study is
+    sizes = [
+        f"{result.sizes[dim]} {agreeing(result.sizes[dim], dim, dim + 's')}" for dim in telling if dim in result.sizes
+    ]
+    facts = [escape(", ".join([kind_of(result), *sizes]))]
+    if formula := result.attrs.get("formula"):
+        facts.append(f"<code>{escape(str(formula))}</code>")
+    figures, rows = summary_of(result), []
+    for subject, parts in groupby(figures[:MOST_FIGURES], key=lambda figure: figure.subject):
+        cells = []
+        for part in parts:  # with as many digits as the terminal shows: four would hide what a limit is about
+            number = "—" if part.value is None else part.value
+            text = number if isinstance(number, str) else readable(float(number), part.unit, 7).replace(" ", "\u00a0")
+            text = f"> {text}" if part.aspect == MORE_THAN else text
+            cells.append(f"<b>{escape(text)}</b>" + (f" {escape(part.remark)}" if part.remark else ""))
+        head = f'<th style="{CELL}" scope="row">{escape(subject)}</th>'
+        rows.append(f'<tr>{head}<td style="{CELL}">{"; ".join(cells)}</td></tr>')
+    table = f"<table>{''.join(rows)}</table>{_more(len(figures) - MOST_FIGURES, 'figures')}" if rows else ""
+    return _html(str(result.attrs.get("name") or "Result"), facts, table, findings_of(result))
+
+
+def _html(name: str, facts: Sequence[str], body: str, findings: Sequence[Finding]) -> str:
+    """A name, facts below one another, and the findings after the body."""
+    rows = []
+    for finding in findings[:MOST_FINDINGS]:
+        where = f"<code>{escape(finding.where)}</code> " if finding.where else ""
+        where = f"{finding.kind_of_part} " if finding.kind_of_part else where
+        remedy = f" — {with_code(finding.remedy)}" if finding.remedy else ""
+        severity = str(finding.severity)
+        head = f'<b style="color:{COLOURS.get(severity, "inherit")}">{escape(severity)}</b>'
+        rows.append(f"<li>{head} {where}{with_code(finding.what)}{remedy}</li>")
+    listed = f'<ul style="margin:4px 0 0;padding-left:1.2em">{"".join(rows)}</ul>' if rows else ""
+    lines = "".join(f"<div>{fact}</div>" for fact in facts)
+    more = _more(len(findings) - MOST_FINDINGS, "findings")
+    return f'<div class="trunnion"><div style="font-weight:600">{escape(name)}</div>{lines}{body}{listed}{more}</div>'
+
+
+def _more(count: int, what: str) -> str:
+    return f"<p>… and {count} more {what}</p>" if count > 0 else ""

@@ -1,12 +1,13 @@
 """Views of a sweep: figures of the cycle over swept names, as tables, families of curves, maps, and a page.
 
-Tables are of figures over one name, or of one figure over two, a table for each value of further names; long ones are
-thinned evenly, their ends included. Names beyond two are the panels of a figure, names with one value are in its title.
+Figures are named as the columns of the CSV file: `efficiency`, `A.effort_max`, `B.reaction_max`. One name runs along
+the axis or down the table, a second one makes the curves or the columns, each value of further names a panel or a table
+of its own; names with one value are in the title. Long tables are thinned evenly, their ends included.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from math import prod
@@ -14,82 +15,278 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import prefixed
+from trunnion.results.quantities import SUPERSCRIPT, WORDS, prefixed
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Stripe, check_kind, outside
-from trunnion.views.common.cycle import Array
-from trunnion.views.common.peaks import ease_of_status, usual_peak
-from trunnion.views.page import Section, Table, counts, page
-from trunnion.views.readings import ending
-from trunnion.views.scales import (
-    KINDS,
-    Arrangement,
-    Scale,
-    arrange,
-    axis_of,
-    cause,
-    edges,
-    grid,
-    meaning,
-    on_scale,
-    statuses,
-    thinned,
+from trunnion.studies.sweep.study import FIGURES
+from trunnion.views.axis import Array, ease_of_status, usual_peak
+from trunnion.views.charts import (
+    Axis,
+    Chart,
+    ColourScale,
+    Contours,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Panel,
+    Plot,
+    Stripe,
+    check_kind,
+    outside,
 )  # fmt: skip
+from trunnion.views.page import Section, Table, counts, page
 
 if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
+    from trunnion.model.mechanism import Mechanism
 
-__all__ = ["KINDS", "figure", "report", "tables"]
+KINDS = ("curves", "map")  # of figures
+CAUSES = {
+    int(Status.NOT_CONVERGED): "not converged",
+    int(Status.LOCKED): "locked",
+    int(Status.LOAD_UNDEFINED): "load undefined",
+    int(Status.SINGULAR): "dead centre",
+    int(Status.NOT_ASSEMBLED): "cannot be assembled",
+}
+MILDER = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
+SIGNS = {"um": "µm", "deg": "°", **WORDS}  # in figures
+MOST_ROWS, MOST_COLUMNS, MOST_TABLES = 40, 8, 6
+BESIDE = "friction_power_mean", "locking_margin"  # in the table beside the measure, if the sweep has them
+
+
+# ---- what runs along what -----------------------------------------------------------------------------------------
+
+
+class Scale(NamedTuple):
+    """A swept name with its values in the unit they were given in."""
+
+    name: str
+    unit: str
+    values: Array
+
+    @property
+    def title(self) -> str:
+        """The name with its unit, for the head of a column."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
+    def label(self) -> str:
+        """The same for an axis, with the unit as figures show it: µm for um, ° for deg."""
+        return self._replace(unit=SIGNS.get(self.unit, self.unit)).title
+
+    @property
+    def log(self) -> bool:
+        """Whether its values are positive, span ten times or more and are spaced by ratios."""
+        values = np.unique(self.values)
+        if values.size < 3 or values[0] <= 0 or values[-1] < 10 * values[0]:
+            return False
+        ratios, steps = np.diff(np.log(values)), np.diff(values)
+        return bool(ratios.max() / ratios.min() < min(4.0, steps.max() / steps.min()))
+
+    def say(self, index: int) -> str:
+        """A value with its unit."""
+        return f"{self.values[index]:.6g} {self.unit}".rstrip()
+
+    def equation(self, index: int) -> str:
+        """A value for a figure, not to be broken into lines: "misalignment = −5°"."""
+        unit = SIGNS.get(self.unit, self.unit)
+        text = f"{self.name} = {_written(self.values[index])}{'' if unit in ('', '°') else ' '}{unit}"
+        return text.replace(" ", "\u00a0")
+
+    def edges(self, values: Array, margin: float = 0.015) -> Array:
+        """Where the surroundings of rising values end: half-way to the next on the scale of their axis, a little beyond
+        the first and the last."""
+        places = np.log(values) if self.log else values
+        low, high = float(places[0]), float(places[-1])
+        more = margin * (high - low) if high > low else 0.5 * abs(low) or 0.5
+        places = np.concatenate([[low - more], (places[:-1] + places[1:]) / 2, [high + more]])
+        return np.asarray(np.exp(places) if self.log else places, float)
+
+    def axis(self, room: int, margin: float = 0.015) -> Axis:
+        """The axis along which it runs; few values stand there as they were given. room: characters of a line."""
+        values = np.unique(self.values)
+        few = values.size == 1 or (self.log and values.size <= 7)
+        places = [(float(value), _written(value)) for value in values] if few else None
+        low, *_, high = self.edges(values, margin).tolist()
+        return Axis(fill(self.label, room, break_long_words=False), (low, high), places, self.log)
+
+
+def _written(value: float) -> str:
+    """A number as it was given, for a figure: a true minus, 2.5×10⁻⁶ for 2.5e-06."""
+    mantissa, _, power = f"{value + 0.0:.6g}".partition("e")
+    text = f"{mantissa}×10{str(int(power)).translate(SUPERSCRIPT)}" if power else mantissa
+    return text.replace("-", "−")
+
+
+def thinned(count: int, most: int) -> list[int]:
+    """Indices of at most so many of them, evenly, the ends among them."""
+    return [int(i) for i in np.unique(np.rint(np.linspace(0, count - 1, min(count, most))))]
+
+
+class Arrangement(NamedTuple):
+    """Which name runs along the axis, which makes the curves (or runs upwards in a map), which the panels.
+
+    fixed: names with one value, which have no place but in the title.
+    """
+
+    x: Scale
+    other: Scale | None
+    facets: tuple[Scale, ...]
+    fixed: tuple[Scale, ...]
+
+    def title(self, text: str, place: Sequence[int] = ()) -> str:
+        """A title with the values of the facets at a place, and of the fixed names."""
+        at = [scale.equation(i) for scale, i in zip(self.facets, place, strict=False)]
+        at += [scale.equation(0) for scale in self.fixed]
+        return f"{text} at {', '.join(at)}" if at else text
+
+    @property
+    def places(self) -> list[tuple[int, ...]]:
+        """The panels: a number of the value of each facet."""
+        return list(product(*(range(len(scale.values)) for scale in self.facets)))
+
+    def cube(self, result: xr.Dataset, values: NDArray[Any]) -> NDArray[Any]:
+        """Values of all points in the order of the file as (axis, curve, *facets)."""
+        swept = attribute(result, "swept")
+        array = xr.DataArray(values.reshape([result.sizes[name] for name in swept]), dims=swept)
+        array = array.squeeze([scale.name for scale in self.fixed])
+        drawn = [self.x.name, *([self.other.name] if self.other else []), *(scale.name for scale in self.facets)]
+        cube = array.transpose(*drawn).values
+        return np.asarray(cube if self.other else cube[:, np.newaxis])
+
+
+def arrange(result: xr.Dataset, x: str = "", family: str = "") -> Arrangement:
+    """What runs along what: the axis is `x`, the curves are of `family`, the panels of the other names, in order.
+
+    Unless they are given, the first two names with more than one value. MechanismError for a name that is not swept.
+    """
+    every = {}
+    for name in attribute(result, "swept"):
+        about = result[name].attrs
+        unit = str(about["written_unit"] or about["units"])
+        every[name] = Scale(
+            name, "" if unit == "1" else unit, result[name].values / float(about["written_factor"]) + 0.0
+        )
+    first, second = check_axes({name: len(scale.values) for name, scale in every.items()}, x, family)
+    rest = [scale for name, scale in every.items() if name not in (first, second)]
+    facets, fixed = (tuple(s for s in rest if (len(s.values) > 1) is varies) for varies in (True, False))
+    return Arrangement(every[first], every[second] if second else None, facets, fixed)
+
+
+def check_axes(sizes: Mapping[str, int], x: str = "", family: str = "") -> tuple[str, str]:
+    """Names of the axis and of the curves, "" if there is one curve, from how many values each swept name has."""
+    for name, option in ((x, "--x"), (family, "--family")):
+        if name and name not in sizes:
+            raise MechanismError(Finding(f"'{name}' is not swept over", option, nearest(name, sizes)))
+    if x and x == family:
+        raise MechanismError(Finding(f"'{x}' cannot be both the axis and the curves", "--family", "name another"))
+    order = sorted(sizes, key=lambda name: sizes[name] == 1)  # stable: as given, those with one value last
+    first = x or next((name for name in order if name != family), family)
+    second = family if first != family else ""
+    return first, second or next((name for name in order if name != first and sizes[name] > 1), "")
+
+
+def check_measure(measures: str | Iterable[str], mechanism: Mechanism) -> list[str]:
+    """Those of the names that are of measures of the model, or written as one is, and not of figures of every sweep.
+
+    MechanismError with the nearest name, and the measures there are, if a name is neither.
+    """
+    of_dim = {"driver": list(mechanism.drivers), "joint": list(mechanism.effective_joints)}
+    every = [
+        f"{member}.{key.removeprefix('drive_')}" if figure.dims else key
+        for key, figure in FIGURES.items()
+        for member in (of_dim[figure.dims[0]] if figure.dims else [""])
+        if key != "status"
+    ]
+    of_model = []
+    for name in [measures] if isinstance(measures, str) else measures:
+        if name in mechanism.measures or (":" in name and name not in every):
+            of_model.append(name)
+        elif name not in every:
+            remedy = nearest(name, [*every, *mechanism.measures])
+            if mechanism.measures:
+                remedy += f"; the model's measures are {', '.join(mechanism.measures)}"
+            raise MechanismError(Finding(f"there is no figure or measure '{name}'", "--measure", remedy))
+    return of_model
+
+
+def grid(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
+    """Unit and values, (axis, curve, *facets), of a figure."""
+    every = figures_of(result)
+    if name not in every:
+        of_errors = name.endswith(("_ideal", "transmission_error_max"))
+        what = "no mechanism of the sweep has errors" if of_errors else "the sweep does not hold it"
+        remedy = "state errors, a misalignment or a seat: loaded" if of_errors else nearest(name, every)
+        raise MechanismError(Finding(f"{what}: there is no figure '{name}'", "--measure", remedy))
+    unit, values = every[name]
+    return unit, plan.cube(result, np.asarray(values, float))
+
+
+def statuses(result: xr.Dataset, plan: Arrangement) -> NDArray[np.int8]:
+    """Codes of status, (axis, curve, *facets)."""
+    return plan.cube(result, result["status"].transpose(*attribute(result, "swept")).values.astype(np.int8))
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
 
-MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
-LEAST_ROWS, LEAST_COLUMNS, MOST_TABLES = 6, 3, 6
-BESIDE = "friction_power_mean", "locking_margin"  # in the table beside the measure, if the sweep has them
-MILDER = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
 
-
-def tables(
-    result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "", room: int = 1000
-) -> list[Table]:
-    """One table of several figures over a single name; of more names one for each measure and value of the facets.
-
-    room: characters in a line, which limit how many columns of a long table are shown.
-    """
+def tables(result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "") -> list[Table]:
+    """One table of several figures over a single name; of more names one for each measure and value of the facets."""
     result = without_noise(result)
     plan = arrange(result, x, family)
+    status = statuses(result, plan)
     if plan.other is None:
-        return [_list(result, measures, plan)]
-    return [table for measure in measures for table in _matrices(result, measure, plan, plan.other, room)]
+        return [_over_one(result, measures, plan, status[:, 0])]
+    every = []
+    for measure in measures:
+        name, values = _column(result, plan, measure)
+        picked = [plan.places[i] for i in thinned(len(plan.places), MOST_TABLES)]
+        down, across = (
+            thinned(len(plan.x.values), MOST_ROWS // len(picked)),
+            thinned(len(plan.other.values), MOST_COLUMNS),
+        )
+        for place in picked:
+            cell: Any = (slice(None), slice(None), *place)
+            rows = [[_number(plan.x.values[i]),
+                     *(_number(values[cell][i, k], name) or CAUSES.get(int(status[cell][i, k]), "") for k in across)]
+                    for i in down]  # fmt: skip
+            title = plan.title(f"{name} over {plan.x.name} and, in columns, {plan.other.name},", place).rstrip(",")
+            shown = len(down) * len(across)
+            every.append(
+                Table(title, [plan.x.title, *(plan.other.say(k) for k in across)], rows, values[cell].size - shown)
+            )
+        hidden = (len(plan.places) - len(picked)) * len(plan.x.values) * len(plan.other.values)
+        every[-1] = replace(every[-1], left_out=every[-1].left_out + hidden)
+    return every
 
 
-def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
-    """Several figures over one name."""
-    every = figures_of(result)
-    columns, heads = [], []
-    for name in dict.fromkeys([*measures, "efficiency", "efficiency_ideal", *_efforts(every), *BESIDE]):
-        if name in every or name in measures:
-            head, values = _column(result, plan, name)
-            columns.append(values[:, 0])
-            heads.append(head)
-    status = [int(code) for code in statuses(result, plan)[:, 0]]
-    words = [cause(code) if code >= Status.NOT_CONVERGED else MILDER.get(code, "") for code in status]
+def _over_one(result: xr.Dataset, measures: Sequence[str], plan: Arrangement, status: NDArray[np.int8]) -> Table:
+    """Several figures over one name: the measures, efficiency and efforts, and what stands beside.
+
+    Of a driver's effort the ends that lie beyond 0 at any point: both where its sign changes.
+    """
+    every, efforts = figures_of(result), list[str]()
+    for driver in (name.removesuffix(".effort_max") for name in every if name.endswith(".effort_max")):
+        ends = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
+        reached = [name for name, sign in ends.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
+        efforts += reached or [f"{driver}.effort_max"]
+    columns = [_column(result, plan, name)
+               for name in dict.fromkeys([*measures, "efficiency", "efficiency_ideal", *efforts, *BESIDE])
+               if name in every or name in measures]  # fmt: skip
+    words = [(CAUSES | MILDER).get(int(code), "") for code in status]
     picked = thinned(len(plan.x.values), MOST_ROWS)
-    figures = list(zip(columns, heads, strict=True))
-    rows = [
-        [_number(plan.x.values[i]), *(_number(column[i], head) for column, head in figures), words[i]] for i in picked
-    ]
+    rows = [[_number(plan.x.values[i]), *(_number(values[i, 0], head) for head, values in columns),
+             *([words[i]] if any(words) else [])] for i in picked]  # fmt: skip
     title = f"{', '.join(name.replace('_', ' ') for name in measures)} over {plan.x.name}"
-    table = Table(_titled(title, plan.at()), [plan.x.title, *heads, "status"], rows, len(words) - len(picked))
-    return table if any(words) else replace(table, head=table.head[:-1], rows=[row[:-1] for row in rows])
+    head = [plan.x.title, *(head for head, _ in columns), *(["status"] if any(words) else [])]
+    return Table(plan.title(f"{title},").rstrip(","), head, rows, len(words) - len(picked))
 
 
 def _column(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
@@ -97,54 +294,6 @@ def _column(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Arra
     unit, values = grid(result, plan, name)
     factor, display_unit = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
     return name.replace("_", " ") + (f" [{display_unit}]" if display_unit not in ("", "1") else ""), factor * values
-
-
-def _efforts(every: dict[str, tuple[str, Any]]) -> list[str]:
-    """The ends of every driver's effort that lie beyond 0 at any point: both where its sign changes."""
-    picked = []
-    for driver in (name.removesuffix(".effort_max") for name in every if name.endswith(".effort_max")):
-        ends_of = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
-        reached = [name for name, sign in ends_of.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
-        picked += reached or [f"{driver}.effort_max"]
-    return picked
-
-
-def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, other: Scale, room: int) -> list[Table]:
-    """A table for each combination of the facets' values; of many of them some."""
-    (name, values), status = _column(result, plan, measure), statuses(result, plan)
-    places = list(product(*(range(len(scale.values)) for scale in plan.facets)))
-    picked = [places[i] for i in thinned(len(places), MOST_TABLES)]
-    most = max(LEAST_ROWS, MOST_ROWS // len(picked))
-    matrices = []
-    for place in picked:
-        at = [scale.equation(i) for scale, i in zip(plan.facets, place, strict=True)] + [plan.at()] * bool(plan.fixed)
-        title = _titled(f"{name} over {plan.x.name} and, in columns, {other.name}", ", ".join(at))
-        index: Any = (slice(None), slice(None), *place)
-        matrices.append(_matrix(title, plan.x, other, values[index], status[index], most, room))
-    hidden = (len(places) - len(picked)) * plan.x.values.size * other.values.size
-    matrices[-1] = replace(matrices[-1], left_out=matrices[-1].left_out + hidden)
-    return matrices
-
-
-def _matrix(title: str, x: Scale, other: Scale, values: Array, status: NDArray[np.int8], most: int, room: int) -> Table:
-    """One figure over two names: at most so many rows, and columns that fit the room."""
-    down = thinned(values.shape[0], most)
-    columns = [[x.title, *(_number(x.values[i]) for i in down)]]
-    for k in range(values.shape[1]):
-        causes = [cause(code) if code >= Status.NOT_CONVERGED else "" for code in status[down, k].tolist()]
-        cells = [_number(value, title) or why for value, why in zip(values[down, k].tolist(), causes, strict=True)]
-        columns.append([other.say(k), *cells])
-    # the words of a cause may stand below each other
-    widths = [3 + max(len(column[0]), *(len(w) for cell in column for w in cell.split())) for column in columns]
-    across = thinned(values.shape[1], MOST_COLUMNS)
-    while len(across) > LEAST_COLUMNS and widths[0] + sum(widths[k + 1] for k in across) > room:
-        across = thinned(values.shape[1], len(across) - 1)
-    head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
-    return Table(title, head, rows, values.size - len(down) * len(across))
-
-
-def _titled(title: str, at: str) -> str:
-    return f"{title}, at {at}" if at else title
 
 
 def _number(value: float, head: str = "") -> str:
@@ -175,25 +324,23 @@ HATCHES = {
 
 
 def figure(
-    result: xr.Dataset, measure: str = "efficiency", x: str = "", family: str = "", kind: str = "curves"
-) -> Figure:
+    result: xr.Dataset, kind: str = "curves", measure: str = "efficiency", x: str = "", family: str = ""
+) -> Plot:
     """A number of the cycle over swept names, a panel for each value of further names.
 
     Parameters
     ----------
     result : of a sweep
+    kind : of KINDS. Where there is no answer it is grey or hatched, with the cause; the curves of a mechanism with
+        errors stand beside those of the ideal one, if the sweep has them
     measure : the number, by its column in the CSV file
     x, family : the name along the axis and that of the curves, or upwards in a map; the first two that vary if not
         given
-    kind : of KINDS. Where there is no answer it is grey or hatched, with the cause; the curves of a mechanism with
-        errors stand beside those of the ideal one, if the sweep has them
 
     Raises
     ------
     MechanismError : for names that are not swept, and for a map of fewer than two names that vary
     """
-    from trunnion.views.draw import grid as draw
-
     check_kind(kind, KINDS)
     result = without_noise(result)
     plan = arrange(result, x, family)
@@ -201,57 +348,79 @@ def figure(
         remedy = "sweep over two names with several values each, or draw curves"
         raise MechanismError(Finding("a map needs two names that vary", "--kind map", remedy))
     unit, values = grid(result, plan, measure)
-    ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else None
+    ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else np.full(values.shape, np.nan)
     status, nothing = statuses(result, plan), "∞" if np.isinf(values).any() else "no value"
     values = np.where(np.isfinite(values), values, np.nan)
-    scope = usual_peak(ease_of_status(result, status), values, ideal)
-    factor, shown = prefixed(scope, unit)
-    over = f"{plan.x.name} and {plan.other.name}" if kind == "map" and plan.other else plan.x.name
+    usual = usual_peak(ease_of_status(result, status), values, ideal)
+    factor, unit_shown = prefixed(usual, unit)
+    values, ideal, usual = values * factor, ideal * factor, usual * factor
+    codes = np.where(status >= Status.NOT_CONVERGED, status, np.where(np.isfinite(values), 0, NOTHING))
     noun = meaning(measure, unit)
-    label = f"{noun} [{shown}]" if shown else noun
-    places = list(product(*(range(len(scale.values)) for scale in plan.facets)))
-    picked = [places[k] for k in thinned(len(places), MOST_PANELS)]
-    hidden = f" ({len(picked)} of {len(places)} panels)" if len(picked) < len(places) else ""
-    title = f"{noun} over {over}{f' at {plan.at()}' if plan.fixed else ''}{hidden}"
+    label = f"{noun} [{unit_shown}]" if unit_shown else noun
+    picked = [plan.places[k] for k in thinned(len(plan.places), MOST_PANELS)]
     columns = len(picked) if len(picked) <= 3 else 2 if len(picked) == 4 else 3 if len(picked) <= 9 else 4
-    field = Field(plan, label, nothing, 78 // columns, scope * factor, (factor, unit))
-    make = _map if kind == "map" else _curves
-    every, charts = factor * (values if ideal is None else np.append(values, ideal)), []
+    room, bounds = 78 // columns, _bounds(np.append(values, ideal), usual)
+    colours = _levels(label, np.append(values, ideal), bounds) if kind == "map" else _colours(plan.other)
+    panels = []
     for place in picked:
         index: Any = (slice(None), slice(None), *place)
-        at = (ending(scale.equation(i), field.room) for scale, i in zip(plan.facets, place, strict=True))
-        head = fill(", ".join(text.replace(" ", "\u00a0") for text in at), field.room, break_long_words=False)
-        like = None if ideal is None else ideal[index] * factor
-        charts.append(make(field, every, values[index] * factor, like, status[index], head))
-    colours = _levels(label, every, field.scope) if kind == "map" else _colours(plan.other)
-    title = fill(f"{title[:1].upper()}{title[1:]}", WIDE, break_long_words=False)
-    return draw(title, result, charts, columns, colours)
+        head = fill(plan._replace(fixed=()).title("", place).removeprefix(" at "), room, break_long_words=False)
+        peak = float(np.nanmax(np.abs(values[index]), initial=0.0))
+        cut = [outside(peak / factor, unit)] if peak > usual * (1 + ALIKE) else []
+        lost = (status[index] == Status.CONTACT_LOST) & np.isfinite(values[index])
+        up = Axis(fill(label, 32 if head else 60, break_long_words=False), bounds)
+        draw = _map if kind == "map" else _curves
+        chart = draw(
+            plan, values[index], ideal[index], codes[index], lost, colours, up, room, {NOTHING: nothing} | CAUSES
+        )
+        panels.append(Panel("", [Chart(chart.x, chart.y, [*chart.marks, *cut], title=head, legend=Legend())]))
+    rows = -(-len(panels) // columns)
+    over = f"{plan.x.name} and {plan.other.name}" if kind == "map" and plan.other else plan.x.name
+    hidden = f" ({len(picked)} of {len(plan.places)} panels)" if len(picked) < len(plan.places) else ""
+    title = plan.title(f"{noun[:1].upper()}{noun[1:]} over {over}") + hidden
+    panels = [Panel("", panel.charts, 3.45 if rows == 1 else 0.35 / rows + 2.1) for panel in panels]
+    return Plot(fill(title, WIDE, break_long_words=False), panels, columns, 7.4 if len(panels) == 1 else 9.4,
+                shared=True, colours=colours)  # fmt: skip
 
 
-class Field(NamedTuple):
-    """What all panels share: what runs along what, the number with its unit, what a sound point without one has,
-    characters along a panel, the magnitude that is shown, and factor and unit of the number."""
-
-    plan: Arrangement
-    label: str
-    nothing: str
-    room: int
-    scope: float
-    scale: tuple[float, str]
-
-    def beyond(self, values: Array) -> list[Mark]:
-        """What a panel says of its peak, where that is outside the frame."""
-        peak = float(np.nanmax(np.abs(values), initial=0.0))
-        return [outside(peak / self.scale[0], self.scale[1])] if peak > self.scope * (1 + ALIKE) else []
-
-    def word(self, code: int) -> str:
-        """Why a point has no number."""
-        return self.nothing if code == NOTHING else cause(code)
+def meaning(name: str, unit: str) -> str:
+    """A figure in words: "largest reaction of B"; of a whole cycle what it is called."""
+    member, _, key = name.rpartition(".")
+    about = FIGURES.get(key) or FIGURES.get(f"drive_{key}")
+    if about is None or not about.dims:
+        return name.replace("_", " ")
+    if key == "transmission_error_max":
+        return f"maximum error of the {'slide' if unit == 'm' else 'rotation'} of {member}"
+    return f"{about.long_name} of {member}"
 
 
-def _codes(values: Array, status: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Status of the points without an answer, NOTHING of sound ones without a number, 0 of all others."""
-    return np.where(status >= Status.NOT_CONVERGED, status, np.where(np.isfinite(values), 0, NOTHING))
+def _bounds(every: Array, usual: float) -> tuple[float, float]:
+    """Ends of the common axis of curves, a little beyond all numbers but peaks that are cut."""
+    finite = every[np.isfinite(every)]
+    low, high = np.clip([finite.min(), finite.max()], -usual, usual).tolist() if finite.size else (0.0, 1.0)
+    margin = 0.05 * (high - low) if high - low > ALIKE * usual else 0.1 * abs(high) or 1.0
+    return low - margin, high + margin
+
+
+def _colours(other: Scale | None) -> ColourScale | None:
+    """The scale of colours that tells many curves apart."""
+    if other is None or len(other.values) <= MOST_NAMED:
+        return None
+    return ColourScale(other.label, float(other.values.min()), float(other.values.max()), other.log)
+
+
+def _levels(title: str, every: Array, bounds: tuple[float, float]) -> ColourScale:
+    """Round edges of a few bands over what is shown."""
+    from matplotlib.ticker import MaxNLocator
+
+    finite = every[np.isfinite(every)]
+    ends = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    margin = (bounds[1] - bounds[0]) / 22  # of bounds that are a twentieth wider at either end
+    low, high = bounds[0] + margin, bounds[1] - margin
+    if ends[1] - ends[0] <= ALIKE * max(map(abs, ends)):
+        return ColourScale(title, *bounds, levels=bounds)
+    levels = [float(level) for level in MaxNLocator(BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
+    return ColourScale(title, *ends, levels=levels)
 
 
 def _lost(x: Array, y: Array, size: float) -> list[Mark]:
@@ -261,100 +430,65 @@ def _lost(x: Array, y: Array, size: float) -> list[Mark]:
 
 
 def _curves(
-    field: Field, every: Array, values: Array, ideal: Array | None, status: NDArray[np.int8], head: str
-) -> Chart:
-    """One curve for each value of the second name; grey where none has an answer, crosses at the ends of gaps.
-
-    every: the numbers of all panels, which have one scale.
-    """
-    plan, other = field.plan, field.plan.other
-    order = np.argsort(plan.x.values, kind="stable")
-    x, values, status = plan.x.values[order], values[order], status[order]
-    codes, colours, marks = _codes(values, status), _colours(other), list[Mark]()
+    plan: Arrangement, values: Array, ideal: Array, codes: NDArray[np.int8], lost: NDArray[np.bool_],
+    colours: ColourScale | None, up: Axis, room: int, causes: Mapping[int, str],
+) -> Chart:  # fmt: skip
+    """One curve for each value of the second name; grey where none has an answer, crosses at the ends of gaps."""
+    other, order = plan.other, np.argsort(plan.x.values, kind="stable")
+    x, values, ideal, codes, lost = plan.x.values[order], values[order], ideal[order], codes[order], lost[order]
     gone = np.where((codes == 0).any(axis=1), 0, np.where(codes, codes, NOTHING).max(axis=1))
-    bounds, sides = edges(plan.x, x), np.append(np.flatnonzero(np.diff(gone, prepend=99)), len(gone))
-    for start, stop in pairwise(sides.tolist()):
-        if gone[start]:
-            marks.append(Stripe(bounds[start], bounds[stop], field.word(int(gone[start]))))
-    for k in range(values.shape[1]):
-        look, label = Look(k, mark=MARKS[k % 8] if x.size <= MOST_MARKED else "", size=3.5), None
-        if ideal is not None:
-            label = "as built"
+    ends, sides = plan.x.edges(x), np.append(np.flatnonzero(np.diff(gone, prepend=99)), len(gone))
+    marks: list[Mark] = [Stripe(ends[start], ends[stop], causes[int(gone[start])])
+                         for start, stop in pairwise(sides.tolist()) if gone[start]]  # fmt: skip
+    compared = bool(np.isfinite(ideal).any())
+    for k, y in enumerate(values.T):
+        look = Look(k, mark=MARKS[k % 8] if x.size <= MOST_MARKED else "", size=3.5)
+        label = "as built" if compared else None
         if colours is not None and other is not None:
             look, label = Look(colours.share(float(other.values[k])), 1.2, mark="o" * (x.size == 1)), None
         elif other is not None:
             label = other.equation(k)
-        y = values[:, k]
-        ends = np.isfinite(y) & (np.isnan(np.append(y[:1], y[:-1])) | np.isnan(np.append(y[1:], y[-1:])))
-        cross = look.but(dash="none", mark="x", size=7.0, order=4.0)
-        marks += [Line(x, y, label, look), *([Line(x[ends], y[ends], None, cross)] if ends.any() else [])]
-        if ideal is not None:
+        marks.append(Line(x, y, label, look))
+        at_gap = np.isfinite(y) & (np.isnan(np.append(y[:1], y[:-1])) | np.isnan(np.append(y[1:], y[-1:])))
+        if at_gap.any():
+            marks.append(Line(x[at_gap], y[at_gap], None, look.but(dash="none", mark="x", size=7.0, order=4.0)))
+        if compared:
             name = None if k else "ideal" if other is None else "ideal, dashed"
-            marks.append(Line(x, ideal[order, k], name, Look("ink", 1.0, "long")))
-    rows, across = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(values))
-    marks += _lost(x[rows], values[rows, across], 6.0)
-    finite = every[np.isfinite(every)]
-    low, high = np.clip([finite.min(), finite.max()], -field.scope, field.scope) if finite.size else (0.0, 1.0)
-    margin = 0.05 * (high - low) if high - low > ALIKE * field.scope else 0.1 * abs(high) or 1.0
-    upward = Axis(fill(field.label, 60 if not head else 32, break_long_words=False), (low - margin, high + margin))
-    return Chart(axis_of(plan.x, field.room), upward, [*marks, *field.beyond(values)], title=head)
+            marks.append(Line(x, ideal[:, k], name, Look("ink", 1.0, "long")))
+    rows, across = np.nonzero(lost)
+    return Chart(plan.x.axis(room), up, [*marks, *_lost(x[rows], values[rows, across], 6.0)])
 
 
-def _colours(other: Scale | None) -> ColourScale | None:
-    """The scale of colours that tells many curves apart."""
-    if other is None or len(other.values) <= MOST_NAMED:
-        return None
-    return ColourScale(other.label, float(other.values.min()), float(other.values.max()), on_scale(other) == "log")
-
-
-def _map(field: Field, every: Array, values: Array, ideal: Array | None, status: NDArray[np.int8], head: str) -> Chart:
+def _map(
+    plan: Arrangement, values: Array, ideal: Array, codes: NDArray[np.int8], lost: NDArray[np.bool_],
+    colours: ColourScale | None, up: Axis, room: int, causes: Mapping[int, str],
+) -> Chart:  # fmt: skip
     """Bands of the number over two names, hatched where there is none."""
-    assert field.plan.other is not None  # as `figure` sees to
-    scales = field.plan.x, field.plan.other
-    (x, across), (y, upward) = (np.unique(scale.values, return_index=True) for scale in scales)
-    values, status = values[np.ix_(across, upward)], status[np.ix_(across, upward)]
-    codes = _codes(values, status)
-    gaps = [(field.word(code), hatch, codes == code) for code, hatch in HATCHES.items() if np.any(codes == code)]
-    sides = [edges(scale, places, 0.0) for scale, places in zip(scales, (x, y), strict=True)]
-    drawn = Contours(x, y, values, sides[0], sides[1], _levels(field.label, every, field.scope), gaps)
-    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(values))
-    lost = _lost(x[rows], y[columns], float(np.clip(160 / max(status.shape), 1.5, 8)))
-    along = axis_of(scales[0], field.room, 0.0), axis_of(scales[1], 32 if head else 60, 0.0)
-    return Chart(*along, [drawn, *lost, *field.beyond(values)], title=head)
-
-
-def _levels(title: str, values: Array, scope: float) -> ColourScale:
-    """Round edges of a few bands over what is shown."""
-    from matplotlib.ticker import MaxNLocator
-
-    finite = values[np.isfinite(values)]
-    ends = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    low, high = np.clip(ends, -scope, scope).tolist() if finite.size else ends
-    if high - low <= ALIKE * max(abs(low), abs(high)):
-        half = 0.05 * max(abs(low), abs(high)) or 1.0
-        return ColourScale(title, low - half, high + half, levels=(low - half, high + half))
-    levels = [float(level) for level in MaxNLocator(BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
-    return ColourScale(title, *ends, levels=levels)
+    assert plan.other is not None  # as `figure` sees to
+    assert colours is not None
+    (x, across), (y, upward) = (np.unique(scale.values, return_index=True) for scale in (plan.x, plan.other))
+    at = np.ix_(across, upward)
+    values, codes, lost = values[at], codes[at], lost[at]
+    gaps = [(causes[code], hatch, codes == code) for code, hatch in HATCHES.items() if np.any(codes == code)]
+    drawn = Contours(x, y, values, plan.x.edges(x, 0.0), plan.other.edges(y, 0.0), colours, gaps)
+    rows, columns = np.nonzero(lost)
+    rings = _lost(x[rows], y[columns], float(np.clip(160 / max(lost.shape), 1.5, 8)))
+    return Chart(plan.x.axis(room, 0.0), plan.other.axis(32 if plan.facets else 60, 0.0), [drawn, *rings])
 
 
 # ---- report -------------------------------------------------------------------------------------------------------
 
 
 def report(
-    result: xr.Dataset,
-    measures: Sequence[str] = ("efficiency",),
-    x: str = "",
-    family: str = "",
-    kind: str = "curves",
+    result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "", kind: str = "curves"
 ) -> str:
     """The whole report as HTML, a figure and tables of every measure; options: those of `figure`."""
     over = " and ".join(attribute(result, "swept"))
     facts = [*counts((prod(result.sizes[name] for name in attribute(result, "swept")), "point")), ("over", over)]
     parts = []
     for name in measures:
-        after = []
-        for table in tables(result, [name], x, family):
-            left_out = f"; {table.left_out:,} points more in a table file" if table.left_out else ""
-            after.append(table.titled(table.title + left_out))
-        parts.append(Section(name, "", [(f"{name} over {over}", figure(result, name, x, family, kind))], after=after))
+        after = [table.titled(f"{table.title}; {table.left_out:,} points more in a table file" if table.left_out
+                              else table.title) for table in tables(result, [name], x, family)]  # fmt: skip
+        pictures = [(f"{name} over {over}", figure(result, kind, name, x, family))]
+        parts.append(Section(name, "", pictures, after=after))
     return page(result, "Results over a range of model values", facts, parts)

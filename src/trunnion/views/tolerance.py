@@ -1,17 +1,22 @@
-"""Views of a tolerance analysis: tables, charts, figures, the page."""
+"""Views of a tolerance analysis: what a result holds of each measure, as tables, charts, figures and the page."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import number
+from trunnion.results.dataset import units_along
+from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
+from trunnion.results.scales import without_noise
+from trunnion.views.axis import Abscissa, Array, abscissa, names
 from trunnion.views.charts import (
     Axis,
     Band,
@@ -23,36 +28,313 @@ from trunnion.views.charts import (
     Mark,
     Note,
     Panel,
+    Plot,
     Rule,
-    Stairs,
     check_kind,
     silent,
-)
-from trunnion.views.common.cycle import names
-from trunnion.views.page import Section, Table, counts, page
-from trunnion.views.readings import (
-    LEAST_INDEX,
-    OUTER,
-    MeasureReading,
-    ending,
-    failures,
-    limits_in,
-    readings,
-    share,
-    share_interval,
-    share_parts,
-    value_text,
-)
+)  # fmt: skip
+from trunnion.views.page import NONE, Section, Table, counts, page
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
-
-__all__ = ["KINDS", "MOST_PANELS", "drawable", "figure", "report", "sheet", "tables"]
 
 EXTREMES = ("maximum", "minimum", "largest")  # rules of figures that are taken where the course is extreme
+OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
 APART = 5e-4  # two shares that differ by more are written each
-MOST_ROWS, MOST_BARS = 20, 16  # contributions with a row and a bar of their own
+LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own
+MOST_ROWS, MOST_BARS, FEW_BARS = 20, 16, 4  # contributions with a row, a bar, a bar beside other measures
+
+
+# ---- numbers in words -----------------------------------------------------------------------------------------------
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals, thin spaces between thousands, a true minus, and no minus before a 0."""
+    if not math.isfinite(value):
+        return number(value)
+    text = f"{value:,.{decimals}f}"
+    return text.replace(",", "\u202f").replace("-", "−" if float(text.replace(",", "")) else "")
+
+
+def rounded(value: float, digits: int = 6) -> str:
+    """A number with at most so many significant digits, a true minus and a sign for what has no end."""
+    return f"{value + 0.0:.{digits}g}".replace("inf", "∞").replace("-", "−")
+
+
+def limits_text(lower: float, upper: float) -> str:
+    """Limits of a deviation as a drawing has them: "±0.05", "+0.02/−0.01", "—" for what has no limit."""
+    if lower == -upper:
+        return f"±{rounded(upper)}"
+    ends = (NONE if math.isinf(end) else f"{'+' if end > 0 else ''}{rounded(end)}" for end in (upper, lower))
+    return "/".join(ends)
+
+
+def limits_in(lower: float, upper: float, unit: str, path: str) -> str:
+    """Limits of a toleranced number with their unit; of a play how far its pin may be from the middle."""
+    if math.isnan(lower) or math.isnan(upper):
+        return ""
+    factor, display_unit = drawn_in(max(abs(lower), abs(upper)), unit)
+    within = f"within\u00a0{rounded(upper * factor)}"
+    text = within if is_play(path) else limits_text(lower * factor, upper * factor)
+    return joined(text, display_unit.replace(" ", "\u00a0"))
+
+
+def is_play(path: str) -> bool:
+    """Whether a parameter is the play of a joint: how far its pin may be from the middle, to any side."""
+    return path.startswith("joints.") and path.endswith(".clearance") and path.count(".") == 2
+
+
+def value_text(value: float, unit: str, digits: int = 8) -> str:
+    """A toleranced number with its unit, lengths in mm, with all digits that a drawing would show."""
+    if not math.isfinite(value):
+        return NONE
+    factor, display_unit = drawn_in(abs(value), unit)
+    return joined(rounded(value * factor, digits), display_unit.replace(" ", "\u00a0"))
+
+
+def share(value: float, decimals: int | None = None) -> str:
+    """A share in per cent, near 1 with the digits that tell how near: "99.62 %", "99.998 %", "−3.1 %"."""
+    if math.isnan(value):
+        return NONE
+    if decimals is None:
+        decimals = decimals_of(min(value, 1 - value))
+    return f"{fixed(100 * value, 0 if value in (0.0, 1.0) else decimals)}\u00a0%"
+
+
+def share_interval(value: float, low: float, high: float) -> str:
+    """A share with its interval: "99.62 % (99.41 to 99.76 %)"."""
+    text, ends, _ = share_parts(value, low, high)
+    return f"{text} ({ends})" if ends else text
+
+
+def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | None]:
+    """A share, its interval ("" if there is none), and the decimals of a per cent that the interval bears."""
+    if math.isnan(low) or math.isnan(high):
+        return share(value), "", None
+    decimals = decimals_of(high - low)
+    least = share(low, decimals).removesuffix("\u00a0%")
+    return share(value, decimals), f"{least} to {share(high, decimals)}", decimals
+
+
+# ---- measures -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MeasureReading:
+    """One measure of a result, (parameter, position, quantile, …), with all its numbers in one unit.
+
+    name, text: of the measure, and what it is; course: what its course is, in words; rule: what makes the figure of
+    it, empty if it is not stated. factor: from SI to the unit that is shown, label: that unit; decimals: as many as
+    its spread needs: 112.3000° beside 0.0486°. limits: (lower, upper) of the deviation from nominal, bounds: of the
+    measure itself; SI, infinite without. nominal: 0 if not known; is_size: whether the figure is the size of a
+    deviation, nominally 0 and never below. over: what its course is drawn over, None if it is known at less than two
+    positions or if the figure is a place itself.
+    """
+
+    result: xr.Dataset
+    name: str
+    text: str
+    course: str
+    rule: str
+    factor: float
+    label: str
+    decimals: int
+    limits: tuple[float, float]
+    bounds: tuple[float, float]
+    nominal: float
+    is_size: bool
+    over: Abscissa | None
+
+    def value(self, key: str) -> float:
+        """One number, NaN if the result lacks it."""
+        return float(self.result[key].values) if key in self.result else math.nan
+
+    def row(self, key: str) -> Array:
+        """A row of numbers, empty if the result lacks it."""
+        return np.asarray(self.result[key].values, float) if key in self.result else np.empty(0)
+
+    def has(self, key: str) -> bool:
+        """Whether a number, or any of a row, is known."""
+        return bool(np.any(np.isfinite(self.row(key))))
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """Lower and upper end of the deviation that limits and bounds leave, SI; a size has no lower one."""
+        low, high = (bound - self.nominal for bound in self.bounds)
+        return -math.inf if self.is_size else max(self.limits[0], low), min(self.limits[1], high)
+
+    @property
+    def limited(self) -> bool:
+        """Whether the figure has a limit."""
+        return any(map(math.isfinite, (*self.limits, *self.bounds)))
+
+    @property
+    def rss_label(self) -> str:
+        """RSS, with what it leaves out: that numbers go with each other."""
+        return "RSS, uncorrelated" if self.result.attrs.get("correlated", 0) else "RSS"
+
+    @property
+    def heading(self) -> str:
+        """Name, and what it is."""
+        return f"{self.name}: {self.text}" if self.text else self.name
+
+    @property
+    def in_unit(self) -> str:
+        """The unit behind a title: " [°]"; empty for a pure number."""
+        return f" [{self.label}]" if self.label else ""
+
+    def say(self, value: float, sign: bool = False) -> str:
+        """A value of the measure with its unit; sign: a plus before what is above 0."""
+        text = fixed(value * self.factor, self.decimals)
+        return joined(f"{'+' if sign and value > 0 else ''}{text}", self.label) if math.isfinite(value) else text
+
+    def written(self, key: str) -> str:
+        """A number of the result with its unit; empty if it is not known."""
+        return "" if math.isnan(value := self.value(key)) else self.say(value)
+
+    def between(self, low: float, high: float) -> str:
+        """Two values with their unit once; empty if one is not known."""
+        return "" if math.isnan(low + high) else f"{fixed(low * self.factor, self.decimals)} to {self.say(high)}"
+
+    def deviations(self, low: float, high: float) -> str:
+        """Deviations from nominal as limits are written: "±0.2375°", "−0.1732 to +0.1599°"; the end of a size."""
+        if math.isnan(low) and math.isnan(high):
+            return ""
+        if low == 0.0 and self.nominal == 0.0:
+            return self.say(high)
+        upper = self.say(high, sign=True)
+        if upper.startswith("+") and self.say(-low, sign=True) == upper:
+            return f"±{upper[1:]}"
+        return f"{'+' if low > 0 else ''}{fixed(low * self.factor, self.decimals)} to {upper}"
+
+    @property
+    def limits_said(self) -> str:
+        """The limits in words; empty if there are none."""
+        lower, upper = (limit * self.factor for limit in self.limits)
+        texts = [joined(limits_text(lower, upper), self.label)] if math.isfinite(lower) or math.isfinite(upper) else []
+        for word, bound in zip(("at least", "at most"), self.bounds, strict=True):
+            texts += [f"{word} {joined(rounded(bound * self.factor), self.label)}"] if math.isfinite(bound) else []
+        return ", ".join(texts)
+
+    @property
+    def at_place(self) -> str:
+        """The place of the drive at which the figure is taken: " at 212°"; empty if there is no such one."""
+        turned = str(self.result["place"].attrs.get("units", "")) if "place" in self.result else ""
+        place = self.value("place") * {"rad": 180 / math.pi, "m": 1e3}.get(turned, 1.0)
+        unit = str(self.result.attrs.get("drive_unit", ""))
+        if not math.isfinite(place) or self.over is None:
+            return ""
+        return f" at {place:.4g}°" if unit in ("°", "deg") else f" at {place:.4g}\u00a0{unit}".rstrip()
+
+    @property
+    def interval(self) -> tuple[float, float, float]:
+        """Yield with the ends of its 95 % interval; NaN if it is not known."""
+        return self.value("yield"), self.value("yield_low"), self.value("yield_high")
+
+    @property
+    def outer(self) -> tuple[float, float] | None:
+        """Ends of the range of 99.73 % of the samples."""
+        if not self.has("quantile_value"):
+            return None
+        levels, values = np.asarray(self.result["quantile"].values, float), self.row("quantile_value")
+        ends = [float(values[np.argmin(np.abs(levels - end))]) for end in OUTER if np.isclose(levels, end).any()]
+        return (ends[0], ends[1]) if len(ends) == 2 else None
+
+    @cached_property
+    def contributions(self) -> pd.DataFrame:
+        """Of every toleranced number what it has in the measure, SI, by its path, the largest share first.
+
+        short: without the section, where that names one number only; limits: as in a drawing; sensitivity: of the
+        measure by the number; worst: of the worst case; shares, NaN where they are not known: of the worst case, of
+        RSS², and of the variance, below 0 where a correlated number takes away from what the others do.
+        """
+        paths = names(self.result, "parameter")
+        unknown = np.full(len(paths), np.nan)
+
+        def row(key: str) -> Array:
+            return self.row(key) if key in self.result else unknown
+
+        ends = [path.partition(".")[2] or path for path in paths]
+        rows = pd.DataFrame(
+            {
+                "short": [end if ends.count(end) == 1 else path for path, end in zip(paths, ends, strict=True)],
+                "unit": units_along(self.result["parameter_nominal"], "parameter"),
+                "lower": row("parameter_lower"), "upper": row("parameter_upper"), "sensitivity": row("sensitivity"),
+                "worst": row("contribution_worst_case"), "rss_share": row("contribution_rss"),
+                "variance_share": row("contribution_variance"),
+            },
+            index=paths,
+        )  # fmt: skip
+        rows["limits"] = [limits_in(row.lower, row.upper, row.unit, path) for path, row in rows.iterrows()]
+        total = rows["worst"].sum()
+        rows["worst_share"] = rows["worst"] / (total if total > 0 else np.nan)
+        return rows.sort_values(["rss_share", "worst_share"], ascending=False, kind="stable")
+
+    def largest(self, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """At most so many contributions that have a row or bar of their own, and the rest."""
+        rows = self.contributions
+        sizes = rows[["worst_share", "rss_share", "variance_share"]].abs().max(axis=1).fillna(0.0)
+        large = rows[sizes >= LEAST][:most]
+        large = rows[:1] if large.empty else large
+        if len(rows) == len(large) + 1:  # the last takes no more room than its being left out
+            large = rows
+        return large, rows.drop(large.index)
+
+    def slope(self, row: Any) -> str:
+        """Change of the measure by a number, in the units in which both are written: "0.01365 °/mm"."""
+        if math.isnan(row.sensitivity):
+            return NONE
+        half = row.worst / abs(row.sensitivity) if row.sensitivity else math.nan  # whose unit is that of the limits
+        factor, display_unit = drawn_in(half if half > 0 else 1.0, row.unit)
+        display_unit = display_unit.replace(" ", "\u00a0")
+        unit = f"{self.label or '1'}/{display_unit}" if display_unit else self.label
+        return f"{number(row.sensitivity * self.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
+
+
+def readings(result: xr.Dataset) -> list[MeasureReading]:
+    """Every measure of a result."""
+    result = without_noise(result)
+    units, reads = units_along(result["nominal"], "measure"), []
+    limits, bounds, *words = (
+        attribute(result, key) for key in ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
+    )
+    for i, name in enumerate(names(result, "measure")):
+        alone, over = result.isel(measure=i), None
+        text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
+        if "curve" in alone and "drive" in alone.coords:  # the positions of its course, rising
+            unsolved = np.asarray(alone["status"].values) >= Status.NOT_CONVERGED
+            picked = np.flatnonzero(np.isfinite(alone["curve"].values) | unsolved)
+            alone = alone.isel(position=picked[np.argsort(alone["drive"].values[picked], kind="stable")])
+            if not rule.startswith(("place", "dead")) and np.isfinite(alone["curve"].values).sum() > 1:
+                over = abscissa(alone)
+        deviation, figure_bounds = (
+            (-math.inf if low is None else float(low), math.inf if high is None else float(high))
+            for low, high in ((row[i] if i < len(row) else None) or (None, None) for row in (limits, bounds))
+        )
+        keys = ("nominal", "least", "worst_case_lower", "worst_case_upper", "rss", "deviation")
+        known = {key: float(alone[key].values) if key in alone else math.nan for key in keys}
+        nominal = known["nominal"] if math.isfinite(known["nominal"]) else 0.0
+        least = known["least"] if math.isfinite(known["least"]) else known["worst_case_lower"]
+        sizes = [abs(known[key]) for key in ("worst_case_lower", "worst_case_upper", "rss")]
+        sizes += [3 * known["deviation"], *map(abs, deviation)]
+        spread = max((size for size in sizes if math.isfinite(size) and size > 0), default=abs(nominal))
+        factor, label = scale_of(nominal, [spread], str(units[i]))
+        size = spread * factor
+        decimals = min(max(3 - math.floor(math.log10(size)), 0), 9) if size > 0 and math.isfinite(size) else 4
+        reads.append(MeasureReading(
+            alone, name, text, course, rule, factor, label.replace(" ", "\u00a0"), decimals, deviation, figure_bounds,
+            nominal, nominal == 0.0 and not least < 0.0, over if over is not None and over.span > 0 else None,
+        ))  # fmt: skip
+    return reads
+
+
+def failures(result: xr.Dataset) -> list[tuple[str, int]]:
+    """Why samples have no figures, and how many; all together first."""
+    if "failed" not in result:
+        return []
+    tally = dict(zip(names(result, "cause"), np.asarray(result["failed"].values).astype(int).tolist(), strict=True))
+    rest = [(cause.replace("_", " ").split(":")[0], n) for cause, n in tally.items() if cause != "all" and n]
+    return [("all", tally.get("all", sum(n for _, n in rest))), *rest]
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
@@ -64,9 +346,9 @@ COLUMNS = {"linear": "linear", "searched": "searched", "sampled": "samples", "in
 def tables(result: xr.Dataset) -> list[Table]:
     """Of each measure its figures and contributions; then the samples that failed, and the yield of all limits."""
     parts, reads = list[Table](), readings(result)
-    yields = _overall(result, reads)
     for read in reads:
         parts += _measure_tables(read, read.heading + (f"; limits {read.limits_said}" if read.limited else ""))
+    yields = _overall(result, reads)
     together = [Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])] if yields else []
     return [*parts, *failed(result), *together]
 
@@ -74,37 +356,37 @@ def tables(result: xr.Dataset) -> list[Table]:
 def _measure_tables(read: MeasureReading, title: str) -> list[Table]:
     """Figures, contributions and Sobol indices, as there are."""
     parts = [figures(read).titled(title)]
-    if read.contributions and read.has("contribution_worst_case"):
+    if not read.contributions.empty and read.has("contribution_worst_case"):
         parts.append(contributions(read))
     return [*parts, indices(read)] if read.has("total_order") else parts
 
 
 def cells_of(read: MeasureReading) -> dict[str, Cells]:
     """Nominal, mean, deviation, worst case, RSS, extremes, range, yield and capability, by row and column."""
-    linear = {} if read.is_size else {"linear": read.written("deviation_linear")}
     shift, sigma = read.value("shift_linear"), read.value("deviation_linear")
-    middle = read.nominal + shift
-    mean = "" if math.isnan(shift) or read.is_size else read.say(middle)
-    three = "" if read.is_size else read.between(middle - 3 * sigma, middle + 3 * sigma)
+    middle, rss = read.nominal + shift, read.written("rss")
     at = read.at_place if read.rule in EXTREMES and read.nominal != 0.0 else ""
-    least, most = read.value("least"), read.value("most")
-    extremes = read.written("most") if read.is_size else read.deviations(least - read.nominal, most - read.nominal)
-    rss = read.written("rss")
-    passed: Cells = {}
+    ends = (read.value(key) - read.nominal for key in ("least", "most"))
+    linear = {"mean": "", "sigma": "", "range": ""}
+    if not read.is_size:
+        linear = {"mean": "" if math.isnan(shift) else read.say(middle), "sigma": read.written("deviation_linear"),
+                  "range": read.between(middle - 3 * sigma, middle + 3 * sigma)}  # fmt: skip
+    passed: tuple[str, str, int | None] = ("", "", None)
     if read.limited and not math.isnan(read.interval[0]):
-        passed = dict(zip(("sampled", "interval"), share_parts(*read.interval)[:2], strict=True))
+        passed = share_parts(*read.interval)
     worst = {column: read.deviations(*(read.value(f"{key}_{end}") for end in ("lower", "upper")))
              for column, key in (("linear", "worst_case"), ("searched", "searched"))}  # fmt: skip
     interval = {key: read.between(read.value(f"{key}_low"), read.value(f"{key}_high")) for key in ("mean", "deviation")}
     return {
         "nominal": {"linear": f"{read.written('nominal')}{at}"},
-        "mean": {"linear": mean, "sampled": read.written("mean"), "interval": interval["mean"]},
-        "deviation σ": {**linear, "sampled": read.written("deviation"), "interval": interval["deviation"]},
+        "mean": {"linear": linear["mean"], "sampled": read.written("mean"), "interval": interval["mean"]},
+        "deviation σ": {"linear": linear["sigma"], "sampled": read.written("deviation"),
+                        "interval": interval["deviation"]},
         "worst case": worst,
         read.rss_label: {"linear": f"±{rss}" if rss else ""},
-        "extremes": {"sampled": extremes},
-        "99.73 % range": {"linear": three, "sampled": read.between(*read.outer) if read.outer else ""},
-        "yield": passed,
+        "extremes": {"sampled": read.written("most") if read.is_size else read.deviations(*ends)},
+        "99.73 % range": {"linear": linear["range"], "sampled": read.between(*read.outer) if read.outer else ""},
+        "yield": {"sampled": passed[0], "interval": passed[1]},
         **{label: {"sampled": "" if math.isnan(read.value(key)) else number(read.value(key), 3)}
            for label, key in (("Cp", "cp"), ("Cpk", "cpk"))},
     }  # fmt: skip
@@ -117,9 +399,9 @@ def figures(read: MeasureReading) -> Table:
         return Table("results", ["", "linear"], [["nominal", "undefined"]])
     columns = [key for key in COLUMNS if any(cells.get(key) for cells in rows.values())]
     independent = read.result.attrs.get("sampling", "monte-carlo") == "monte-carlo"
-    sampling = "Monte Carlo" if independent else "quasi-Monte Carlo"
-    head = ["", *(sampling if key == "sampled" else COLUMNS[key] for key in columns)]
-    return Table("results", head, [[label, *(cells.get(k, "") for k in columns)] for label, cells in rows.items()])
+    heads = COLUMNS | {"sampled": "Monte Carlo" if independent else "quasi-Monte Carlo"}
+    return Table("results", ["", *(heads[key] for key in columns)],
+                 [[label, *(cells.get(key, "") for key in columns)] for label, cells in rows.items()])  # fmt: skip
 
 
 def contributions(read: MeasureReading) -> Table:
@@ -127,51 +409,48 @@ def contributions(read: MeasureReading) -> Table:
     counted."""
     large, rest = read.largest(MOST_ROWS)
     shares = {"share": "worst_share", "of RSS²": "rss_share"}
-    if any(abs(row.variance_share - row.rss_share) > APART for row in read.contributions):
+    if ((read.contributions["variance_share"] - read.contributions["rss_share"]).abs() > APART).any():
         shares["of variance"] = "variance_share"
-    head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     rows = [
-        [row.short, row.limits, read.slope(row), read.say(row.worst),
-         *(share(getattr(row, key), 1) for key in shares.values())]
-        for row in large
-    ]  # fmt: skip
-    if rest:
-        sums = (float(np.nansum([getattr(row, key) for row in rest])) for key in shares.values())
-        effect = "no effect" if all(row.worst == 0 for row in rest) else "small"
-        rows.append([f"{len(rest)} others, {effect}", "", "", "", *(share(part, 1) for part in sums)])
+        [row.short, row.limits, read.slope(row), read.say(row.worst), *(share(row[key], 1) for key in shares.values())]
+        for _, row in large.iterrows()
+    ]
+    if len(rest):
+        effect = "no effect" if (rest["worst"] == 0).all() else "small"
+        sums = (share(rest[key].sum(), 1) for key in shares.values())
+        rows.append([f"{len(rest)} others, {effect}", "", "", "", *sums])
+    head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     return Table(f"contributions to {read.name}{read.at_place}", head, rows)
 
 
 def indices(read: MeasureReading) -> Table:
     """Sobol indices with their 95 % intervals, the largest total first; those below half a per cent are counted."""
-    short = {row.name: row.short for row in read.contributions}
     paths = names(read.result, "parameter")
     total = np.where(np.isfinite(read.row("total_order")), read.row("total_order"), -1.0)
     every = np.argsort(-total, kind="stable").tolist()
     order = [j for j in every if total[j] >= LEAST_INDEX] or every[:1]
     ends = [[read.row(f"{key}{end}") for end in ("", "_low", "_high")] for key in ("first_order", "total_order")]
     rows = [
-        [short[paths[j]], *(share_interval(*(float(row[j]) for row in key)).replace("-", "−") for key in ends)]
+        [read.contributions["short"][paths[j]],
+         *(share_interval(*(float(row[j]) for row in key)).replace("-", "−") for key in ends)]
         for j in order
-    ]
+    ]  # fmt: skip
     rows += [[f"{len(paths) - len(order)} others", "", ""]] if len(order) < len(paths) else []
     return Table(f"Sobol indices of {read.name}", ["share of the variance", "alone", "with interactions"], rows)
 
 
-def corners(read: MeasureReading) -> Table | None:
-    """The numbers at which the searched worst case stands; None if it was not searched."""
+def corners(read: MeasureReading) -> list[Table]:
+    """The numbers at which the searched worst case stands; no table if it was not searched."""
     searched = {end: read.value(f"searched_{end}") for end in ("lower", "upper") if read.has(f"corner_{end}")}
     searched = {end: value for end, value in searched.items() if math.isfinite(value) and value != 0.0}
-    if not searched:
-        return None
-    about = {row.name: row for row in read.contributions}
-    head = ["worst corner", *(read.say(read.nominal + value) for value in searched.values())]
+    about = read.contributions.loc[names(read.result, "parameter")]
     rows = [
-        [path, *(value_text(float(read.row(f"corner_{end}")[j]), about[path].unit) for end in searched)]
-        for j, path in enumerate(names(read.result, "parameter"))
-        if about[path].worst != 0
+        [path, *(value_text(float(read.row(f"corner_{end}")[j]), row.unit) for end in searched)]
+        for j, (path, row) in enumerate(about.iterrows())
+        if row.worst != 0
     ]
-    return Table(f"worst corners of {read.name}, of the nonlinear model", head, rows)
+    head = ["worst corner", *(read.say(read.nominal + value) for value in searched.values())]
+    return [Table(f"worst corners of {read.name}, of the nonlinear model", head, rows)] if searched else []
 
 
 def overview(reads: Sequence[MeasureReading]) -> Table:
@@ -208,14 +487,14 @@ def _overall(result: xr.Dataset, reads: Sequence[MeasureReading]) -> tuple[float
 
 def inputs(read: MeasureReading) -> Table:
     """Every toleranced number: nominal, limits, standard deviation, shift of its mean."""
-    units = {row.name: row.unit for row in read.contributions}
-    keys = ("parameter_nominal", "parameter_lower", "parameter_upper", "parameter_deviation", "parameter_shift")
-    nominal, lower, upper, *others = (read.row(key) for key in keys)
-    rows = []
-    for j, path in enumerate(names(read.result, "parameter")):
-        unit = units[path]
-        cells = [value_text(float(nominal[j]), unit), limits_in(float(lower[j]), float(upper[j]), unit, path)]
-        rows.append([path, *cells, *(value_text(float(row[j]), unit, 4) if row.size else "" for row in others)])
+    keys = ("parameter_nominal", "parameter_deviation", "parameter_shift")
+    nominal, *others = (read.row(key) for key in keys)
+    about = read.contributions.loc[names(read.result, "parameter")]
+    rows = [
+        [path, value_text(float(nominal[j]), row.unit), row.limits,
+         *(value_text(float(values[j]), row.unit, 4) if values.size else "" for values in others)]
+        for j, (path, row) in enumerate(about.iterrows())
+    ]  # fmt: skip
     return Table("toleranced parameters", ["number", "nominal", "limits", "standard deviation", "shift of mean"], rows)
 
 
@@ -238,65 +517,71 @@ def histogram(read: MeasureReading) -> Panel:
     shift, title = 0.0, f"{read.name}{read.in_unit}"
     if 0 < high - low <= READABLE * abs(read.nominal) or (low == high and read.nominal):
         shift, title = read.nominal, f"deviation of {read.name} from nominal {read.say(read.nominal)}{read.in_unit}"
+
+    def place(value: Any) -> Any:
+        return (value - shift) * read.factor
+
+    limits = [read.nominal + end for end in read.room]
     width = high - low or abs(high) or 1.0
-    ends = [low, high, read.nominal, *(read.nominal + end for end in read.room)]
-    ends = [end for end in ends if low - width < end < high + width]  # no limit far away makes the bars narrow
-    x, margin = (bins - shift) * read.factor, 0.04 * (max(ends) - min(ends))
-    marks: list[Mark] = [Stairs(heights, x, "samples", Look(WITHIN))]
+    ends = [end for end in (low, high, read.nominal, *limits) if low - width < end < high + width]  # no limit far away
+    x = np.unique([*bins, *np.clip(limits, low, high)])  # the bars, cut at the limits
+    sizes = heights[np.clip(np.searchsorted(bins, x, side="right") - 1, 0, len(heights) - 1)]
+    kept = (
+        ((x[:-1] + x[1:]) / 2 >= limits[0]) & ((x[:-1] + x[1:]) / 2 <= limits[1]) if x.size > 1 else np.empty(0, bool)
+    )
+    inside = np.append(kept, kept[-1:]) if x.size > 1 else np.ones(1, bool)
+    zero, name, marks = np.zeros(len(x)), "samples", list[Mark]()
     if read.limited:
-        lower, upper = ((read.nominal + end - shift) * read.factor for end in read.room)
-        passed, _, decimals = read.interval[0], *share_parts(*read.interval)[1:]
+        name = f"within {share_interval(*read.interval)}"
         lost = "beyond, or failed," if any(n for _, n in failures(read.result)) else "beyond"
-        outside_text = None if passed == 1.0 else f"{lost} {share(1 - passed, decimals)}"
-        window = (max(lower, float(x[0])), min(upper, float(x[-1])))
-        marks = [Stairs(heights, x, f"within {share_interval(*read.interval)}", Look(WITHIN, order=2.1), window),
-                 Stairs(heights, x, outside_text, Look(BEYOND))]  # fmt: skip
-    marks += _histogram_lines(read, shift)
-    across = Axis(title, ((min(ends) - margin - shift) * read.factor, (max(ends) + margin - shift) * read.factor))
-    upward = Axis("samples", (0, 1.06 * max(float(heights.max(initial=0.0)), 1.0)), integer=True)
-    return Panel("", [Chart(across, upward, marks, legend=Legend(3))])
-
-
-def _histogram_lines(read: MeasureReading, shift: float) -> list[Mark]:
-    """Upright lines: limits, nominal, mean, ends of the range of 99.73 %."""
-    limits = [read.nominal + end for end in read.room if math.isfinite(end)]
-    text = f"limit{'s' if len(limits) > 1 else ''} {read.limits_said}"
-    places: list[tuple[float, str | None, Look]] = [(end, None if k else text, LIMIT) for k, end in enumerate(limits)]
+        text = (
+            None if read.interval[0] == 1.0 else f"{lost} {share(1 - read.interval[0], share_parts(*read.interval)[2])}"
+        )
+        marks.append(Band(place(x), zero, np.where(inside, 0.0, sizes), text, Look(BEYOND), steps=True))
+    marks.insert(0, Band(place(x), zero, np.where(inside, sizes, 0.0), name, Look(WITHIN, order=2.1), steps=True))
+    lines: list[tuple[float, str | None, Look]] = []
+    finite = [limit for limit in limits if math.isfinite(limit)]
+    text = f"limit{'s' if len(finite) > 1 else ''} {read.limits_said}"
+    lines += [(limit, None if k else text, LIMIT) for k, limit in enumerate(finite)]
     if read.has("nominal") and not read.is_size:
-        places.append((read.nominal, f"nominal {read.say(read.nominal)}", Look("ink", 1.3, order=3)))
-    mean = read.value("mean")
-    places.append((mean, f"mean {read.say(mean)}", Look("ink", 1.3, "long", order=3)))
+        lines.append((read.nominal, f"nominal {read.say(read.nominal)}", Look("ink", 1.3, order=3)))
+    lines.append((read.value("mean"), f"mean {read.say(read.value('mean'))}", Look("ink", 1.3, "long", order=3)))
     for k, end in enumerate(read.outer or ()):
         text = f"99.73 %: {' to '.join(map(read.say, read.outer or ()))}"
-        places.append((end, None if k else text, Look("muted", 1.0, "short", order=3)))
-    return [Rule((at - shift) * read.factor, name, look) for at, name, look in places]
+        lines.append((end, None if k else text, Look("muted", 1.0, "short", order=3)))
+    marks += [Rule(place(at), text_of, look) for at, text_of, look in lines]
+    margin = 0.04 * (max(ends) - min(ends))
+    across = Axis(title, (place(min(ends) - margin), place(max(ends) + margin)))
+    upward = Axis("samples", (0, 1.06 * max(float(heights.max(initial=0.0)), 1.0)))
+    return Panel("", [Chart(across, upward, marks)])
 
 
 def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
     """Share of each number in the sum of squares, sorted, with the running total, and beside it in the worst case."""
     large, rest = read.largest(most)
-    labels = [f"{ending(row.short, NAME)}  {row.limits}".rstrip() for row in large]
-    labels += [f"{len(rest)} others"] if rest else []
-    rss, worst = (
-        100 * np.array([*(getattr(row, key) for row in large),
-                        *([np.nansum([getattr(row, key) for row in rest])] if rest else [])], float)
-        for key in ("rss_share", "worst_share")
-    )  # fmt: skip
-    at = np.arange(float(len(labels)))
+    labels = [f"{ending(row.short, NAME)}  {row.limits}".rstrip() for _, row in large.iterrows()]
+    labels += [f"{len(rest)} others"] if len(rest) else []
+    rss, worst = (100 * np.array([*large[key], *([rest[key].sum()] if len(rest) else [])], float)
+                  for key in ("rss_share", "worst_share"))  # fmt: skip
+    at, running = np.arange(float(len(labels))), np.nancumsum(rss)
     marks: list[Mark] = [Bars(at - 0.17, rss, 0.4, read.rss_label.replace("RSS", "RSS²"), Look(0)),
-                         Bars(at + 0.23, worst, 0.28, "worst case", Look("pale"))]  # fmt: skip
-    running = np.nancumsum(rss)
-    marks.append(Line(running, at - 0.17, "RSS², added up", Look("ink", 1.2, mark="o", size=3.5, order=3)))
+                         Bars(at + 0.23, worst, 0.28, "worst case", Look("pale")),
+                         Line(running, at - 0.17, "RSS², added up", Look("ink", 1.2, mark="o", size=3.5, order=3)),
+                         Rule(0.0, None, Look("muted", 0.8))]  # fmt: skip
     for y, part in zip(at, rss, strict=True):
+        inside = part > 100 * INSIDE
         if math.isfinite(part):
-            inside = part > 100 * INSIDE
             marks.append(Note(f"{part:.1f}", float(part), y - 0.17, "right" if inside else "left", data=True, size=7.5,
                               colour="white" if inside else "ink", shift=(-6 if inside else 4, 0)))  # fmt: skip
-    marks.append(Rule(0.0, None, Look("muted", 0.8)))
     across = Axis("share [%]", (0.0, 1.04 * max([100.0, *running])))
     side = Axis("", (len(labels) - 0.4, -0.6), list(enumerate(labels)))  # names down the side, the largest on top
     chart = Chart(across, side, marks, legend=Legend(room=44), bare=True)
     return Panel("", [chart], max(1.4 + 0.34 * len(labels), 2.6))
+
+
+def ending(name: str, most: int) -> str:
+    """A name of so many characters: the end of a longer one, by which those of one folder differ."""
+    return name if len(name) <= most else f"…{name[1 - most :]}"
 
 
 def envelope(read: MeasureReading) -> Panel:
@@ -325,14 +610,13 @@ def envelope(read: MeasureReading) -> Panel:
         marks += [Rule(limit * factor, None if k else f"limits {read.limits_said}", LIMIT, upright=False)
                   for k, limit in enumerate(limits)]  # fmt: skip
     title = f"deviation of {read.course or read.name}{read.in_unit}"
-    return Panel("", [Chart(over, Axis(title, margin=0.07), marks, zero=True, legend=Legend(4))], 3.8)
+    return Panel("", [Chart(over, Axis(title, margin=0.07), marks, zero=True)], 3.8)
 
 
 # ---- figures ------------------------------------------------------------------------------------------------------
 
 MOST_PANELS = 6  # measures of a figure
 TALL, SHORT = 16.0, 2.5  # heights of a whole sheet and of a panel on it, inches
-FEW_BARS = 4  # of a sheet of several measures
 
 
 class Kind(NamedTuple):
@@ -359,59 +643,42 @@ def drawable(read: MeasureReading) -> list[str]:
     return [name for name, kind in KINDS.items() if kind.ready(read)]
 
 
-def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None) -> Figure:
-    """One kind of figure, a panel for each measure, at most MOST_PANELS; all that have it if none is named.
+def figure(result: xr.Dataset, kind: str | None = None, measures: Sequence[str] | None = None) -> Plot:
+    """One kind of figure, a panel for each measure that has it; all kinds, a row for each measure, if none is named.
 
-    Raises
-    ------
-    MechanismError : if there is no such kind, none of the measures has it, or they are too many
+    measures: at most MOST_PANELS, all if none is named. MechanismError if there is no such kind, or no measure has it.
     """
-    check_kind(kind, KINDS)
-    reads = _named(result, measures, KINDS[kind].ready)
-    if not reads:
-        raise MechanismError(Finding(f"no measure has a figure '{kind}'", "--kind", KINDS[kind].remedy))
-    return _drawn(result, KINDS[kind], reads)
-
-
-def _drawn(result: xr.Dataset, about: Kind, reads: Sequence[MeasureReading]) -> Figure:
-    """One kind of figure of some measures, a panel for each."""
-    from trunnion.views.draw import figure as draw
-
-    title = about.title if len(reads) > 1 else f"{about.title}: {reads[0].name}"
-    return draw(title, result, [replace(about.panel(read), title=read.heading) for read in reads])
-
-
-def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
-    """All kinds of figures of one measure; of several, at most MOST_PANELS, the main ones, a row for each measure."""
-    from trunnion.views.draw import figure as draw
-
-    reads = _named(result, measures, lambda read: bool(drawable(read)))
-    if not reads:
-        raise MechanismError(Finding("no measure has a figure", remedy="add --method linear"))
-    if len(reads) == 1:
-        (read,) = reads
-        panels = [replace(KINDS[kind].panel(read), title=KINDS[kind].title) for kind in drawable(read)]
-        return draw(read.heading, result, panels, columns=2)
-    few: dict[str, Callable[[MeasureReading], Panel]] = {
-        "histogram": histogram, "contributions": lambda read: contribution_bars(read, FEW_BARS), "envelope": envelope
-    }  # fmt: skip
-    kinds = [kind for kind in few if any(KINDS[kind].ready(read) for read in reads)]
-    height = max(min(3.3, TALL / len(reads)), SHORT)
-    panels = [Panel(f"{read.name}: {KINDS[kind].title.lower()}",
-                    few[kind](read).charts if KINDS[kind].ready(read) else [], height)
-              for read in reads for kind in kinds]  # fmt: skip
-    return draw("Effect of the tolerances", result, panels, columns=len(kinds))
-
-
-def _named(
-    result: xr.Dataset, measures: Sequence[str] | None, ready: Callable[[MeasureReading], bool]
-) -> list[MeasureReading]:
-    """The measures that are named, or all, which have a figure. MechanismError if they do not fit one figure."""
-    reads = [read for read in readings(result) if (measures is None or read.name in measures) and ready(read)]
+    if kind is not None:
+        check_kind(kind, KINDS)
+    reads = [read for read in readings(result) if (measures is None or read.name in measures)
+             and (KINDS[kind].ready(read) if kind else drawable(read))]  # fmt: skip
     if len(reads) > MOST_PANELS:
         what = f"{len(reads)} measures do not fit one figure"
         raise MechanismError(Finding(what, "--out", f"name at most {MOST_PANELS} by --measure"))
-    return reads
+    if not reads:
+        what, remedy = (f" '{kind}'", KINDS[kind].remedy) if kind else ("", "add --method linear")
+        raise MechanismError(Finding(f"no measure has a figure{what}", "--kind", remedy))
+    if kind is not None:
+        return _of_kind(KINDS[kind], reads)
+    if len(reads) == 1:
+        panels = [replace(KINDS[name].panel(reads[0]), title=KINDS[name].title) for name in drawable(reads[0])]
+        return Plot(reads[0].heading, panels, 2)
+    kinds = [name for name, about in KINDS.items() if any(about.ready(read) for read in reads)]
+    height, panels = max(min(3.3, TALL / len(reads)), SHORT), []
+    for read in reads:
+        for name in kinds:
+            about = KINDS[name]
+            panel = Panel("", [])
+            if about.ready(read):
+                panel = contribution_bars(read, FEW_BARS) if name == "contributions" else about.panel(read)
+            panels.append(replace(panel, title=f"{read.name}: {about.title.lower()}", height=height))
+    return Plot("Effect of the tolerances", panels, len(kinds))
+
+
+def _of_kind(about: Kind, reads: Sequence[MeasureReading]) -> Plot:
+    """One kind of figure of some measures, a panel for each."""
+    title = about.title if len(reads) > 1 else f"{about.title}: {reads[0].name}"
+    return Plot(title, [replace(about.panel(read), title=read.heading) for read in reads])
 
 
 # ---- report -------------------------------------------------------------------------------------------------------
@@ -429,16 +696,11 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tol
     reads = readings(result)
     yields = _overall(result, reads)
     about = f"All limits together: yield {share_interval(*yields)}" if yields else ""
-    parts = [Section("Measures", about, tables=[overview(reads), *failed(result)])]
+    parts = [Section("Measures", about, tables=[overview(reads), *failed(result)]), *first]
+    for read in reads:
+        about = "; ".join(part for part in (read.text, f"limits {read.limits_said}" if read.limited else "") if part)
+        pictures = [(f"{KINDS[kind].title} of {read.name}", _of_kind(KINDS[kind], [read])) for kind in drawable(read)]
+        shown, after = (own := _measure_tables(read, "results"))[:2], own[2:]
+        parts.append(Section(read.name, about, pictures, shown, [*after, *corners(read)]))
     end = [Section("Toleranced parameters", tables=[inputs(reads[0])])]
-    parts += [*first, *(_section(result, read) for read in reads)]
     return page(result, kicker, facts, parts, missed=missed, end=end)
-
-
-def _section(result: xr.Dataset, read: MeasureReading) -> Section:
-    """What there is of one measure."""
-    about = "; ".join(part for part in (read.text, f"limits {read.limits_said}" if read.limited else "") if part)
-    pictures = [(f"{KINDS[kind].title} of {read.name}", _drawn(result, KINDS[kind], [read])) for kind in drawable(read)]
-    corner = corners(read)
-    first, *others = _measure_tables(read, "results")
-    return Section(read.name, about, pictures, [first, *others[:1]], [*others[1:], *([corner] if corner else [])])

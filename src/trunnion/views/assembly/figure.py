@@ -9,14 +9,12 @@ import numpy as np
 from trunnion.errors import agreeing
 from trunnion.results.attributes import summary_of
 from trunnion.results.quantities import parts, prefixed, quantity
-from trunnion.views import draw
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stripe, nth
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
+from trunnion.views.axis import Abscissa, Array, abscissa, column, names
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe, nth
 from trunnion.views.page import Section, Table, page
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
 __all__ = ["figure", "report"]
 
@@ -26,7 +24,7 @@ FITS = 0  # code of the status of a position that goes together
 TOLD = 0.01  # of the need: a joint whose part is nowhere larger has no curve
 
 
-def figure(result: xr.Dataset) -> Figure:
+def figure(result: xr.Dataset) -> Plot:
     """Needed clearance of all pins over the drive; needed share of the stated clearances, if any; parts of the joints.
 
     Grey: where the stated clearances do not suffice.
@@ -37,7 +35,7 @@ def figure(result: xr.Dataset) -> Figure:
         charts.append(_share(result, share, over))
     if np.nanmax(result["uniform_part"].values, initial=0.0) > 0:
         charts.append(_parts(result, over))
-    return draw.figure(TITLE, result, [Panel("", charts, 1.4 + 1.6 * len(charts))])
+    return Plot(TITLE, [Panel("", charts, 1.4 + 1.6 * len(charts))])
 
 
 def _need(result: xr.Dataset, over: Abscissa) -> Chart:
@@ -78,7 +76,7 @@ def _parts(result: xr.Dataset, over: Abscissa) -> Chart:
              if np.nanmax(parts[i], initial=0.0) > 100 * TOLD]  # fmt: skip
     most = float(np.nanmax(parts, initial=0.0))
     top = min(105.0, 1.1 * most) if most > 0 else 105.0
-    return Chart(over, Axis("share of the joint [%]", (0, top)), lines, zero=True, legend=Legend(least=1))
+    return Chart(over, Axis("share of the joint [%]", (0, top)), lines, zero=True, legend=Legend(1))
 
 
 def _short(result: xr.Dataset, over: Abscissa) -> list[Mark]:

@@ -18,7 +18,7 @@ from trunnion.solve.run import prepare
 from trunnion.views.assembly.modes import some
 from trunnion.views.common.drawing import name_points, picture
 from trunnion.views.common.drawing import sketch as sketch_plane
-from trunnion.views.common.figures import INK, MUTED, RULE, Labels, new, plain
+from trunnion.views.draw import INK, MUTED, RULE, Labels, new, plain
 from trunnion.views.space.bodies import space
 from trunnion.views.space.figure import name_joints
 from trunnion.views.space.figure import sketch as sketch_space

@@ -13,8 +13,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import GUIDED, PAIRS
-from trunnion.views.common.cycle import Array, abscissa, layout, members, status_text
-from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, plain
+from trunnion.views.axis import Array, abscissa, layout, members, status_text
+from trunnion.views.draw import INK, MUTED, PALETTE, Labels, plain
 
 if TYPE_CHECKING:
     import xarray as xr

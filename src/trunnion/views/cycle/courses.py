@@ -18,6 +18,21 @@ from trunnion.results.attributes import attribute, summary_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, prefixed, quantity, scaled
 from trunnion.solve.friction_method import MARGIN
+from trunnion.views.axis import (
+    Abscissa,
+    Array,
+    abscissa,
+    column,
+    ease,
+    is_spatial,
+    larger_end,
+    layout,
+    mean_friction,
+    members,
+    names,
+    peak,
+    usual_peak,
+)
 from trunnion.views.charts import (
     FREE,
     Axis,
@@ -37,20 +52,7 @@ from trunnion.views.charts import (
     over_drive,
     silent,
 )
-from trunnion.views.common.cycle import (
-    Abscissa,
-    Array,
-    abscissa,
-    column,
-    larger_end,
-    layout,
-    mean_friction,
-    members,
-    names,
-)
-from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.cycle.deviations import losses, need, outputs, point_errors, worst_points
-from trunnion.views.space.bodies import is_spatial
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -146,7 +148,7 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     every = Line(over.values, total, named("all joints", sum(means.values())), Look("ink", 1.8), close=True)
     area = Band(over.values, np.zeros(total.size), total, None, Look("shade", alpha=0.6, order=1.0), close=True)
     return _stack("Friction power by joint", [over_drive(
-        result, over, "friction power", "W", [every, *lines], bands=[area], scale=(factor, unit), legend=Legend(3)
+        result, over, "friction power", "W", [every, *lines], bands=[area], scale=(factor, unit), legend=Legend()
     )])  # fmt: skip
 
 
@@ -270,7 +272,7 @@ def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             scale = (1.0, unit) if order else None
             if unit == "m":  # as the drive
                 scale = scaled(usual_peak(ease(result), *rows.values()), "m")
-            title, legend = (noun, "velocity", "acceleration")[order], None if order else Legend(6, least=1)
+            title, legend = (noun, "velocity", "acceleration")[order], None if order else Legend(1)
             charts.append(over_drive(result, over, title, unit, lines, rate=RATES[order], scale=scale, legend=legend))
         panels.append(Panel("", charts, 5.8))
     return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
@@ -319,7 +321,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
             marks.append(Rule(figures[k] * scale[0] if level else np.nan, text, look, upright=False))
         line = Line(over.values, values[i], title, Look(0, 2.0), close=True)
-        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=scale, legend=Legend(3)))
+        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=scale, legend=Legend()))
     return _stack("Measures", charts)
 
 
@@ -329,7 +331,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Errors against the mechanism without any: of the worst points and of the joints of the ground, over the drive."""
     need(result, "errors", "error")
-    over, lost_at, legend = abscissa(result), losses(result), Legend(4, least=1)
+    over, lost_at, legend = abscissa(result), losses(result), Legend(1)
     places = np.unique(np.concatenate(list(lost_at.values()))) if lost_at else np.empty(0, int)
     lost = [Rule(float(over.values[place]), None if k else f"contact lost: {', '.join(lost_at)}",
                  Look("limit", 0.9, "dotted", order=1.4)) for k, place in enumerate(places)]  # fmt: skip
@@ -395,7 +397,7 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     if not largest:  # nothing to draw
         marks.append(Note(f"more than {MARGIN:g} at every position", 0.5, 0.5, size=10, colour="ink"))
     searched = f", searched to {MARGIN:g}" if reached and largest else ""
-    upper = Chart(over, Axis(f"times the friction{searched}", (0.0, top)), marks, legend=Legend(least=1))
+    upper = Chart(over, Axis(f"times the friction{searched}", (0.0, top)), marks, legend=Legend(1))
     lower = _efficiency(result, over)
     centred = "; ranges: pins centred" * ("seat_offset" in result and "locking_state" in result)
     return _stack(f"Locking by friction{centred}", [upper, lower], (3, 2) if largest else (1, 2))

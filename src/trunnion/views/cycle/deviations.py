@@ -13,19 +13,20 @@ from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import Units, number, prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import (
+from trunnion.views.axis import (
     Array,
     abscissa,
     column,
+    is_spatial,
     layout,
     mean_friction,
     members,
     names,
     numbers,
+    peak,
     valid,
 )
-from trunnion.views.common.peaks import peak
-from trunnion.views.space.bodies import Space, gathered, is_spatial
+from trunnion.views.space.bodies import Space, gathered
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,37 +5,31 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import rc_context
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.files import whole
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, UnitError
 from trunnion.model.units import KINDS as UNITS
 from trunnion.results.scales import without_noise
 from trunnion.views import draw as drawn
+from trunnion.views.axis import is_spatial
 from trunnion.views.charts import Plot, check_kind
 from trunnion.views.common.drawing import bare, draw, facts, picture
-from trunnion.views.common.figures import Labels, new
 from trunnion.views.cycle import courses, seats
 from trunnion.views.cycle.deviations import has, seated
+from trunnion.views.draw import Labels, new
 from trunnion.views.space import figure as space_figure
-from trunnion.views.space.bodies import is_spatial
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["PLOTS", "check_figure", "drawable", "mechanism", "position_at", "save"]
+__all__ = ["PLOTS", "drawable", "figure", "mechanism", "position_at"]
 
-FORMATS = ("png", "svg", "pdf", "jpg", "jpeg")
 LONGEST = 1.5  # steps: a place further from every position is not one of the cycle
 KIND_OF = {"°": UNITS["angle"], "mm": UNITS["length"], "s": UNITS["time"]}
 
@@ -106,7 +100,7 @@ def figure(
         return mechanism(result, ideal, index)
     plot = PLOTS[kind](result, ideal)
     assert isinstance(plot, Plot)  # all but the mechanism
-    return drawn.figure(plot.title, result, plot.panels, plot.columns, plot.width, plot.note)
+    return drawn.figure(result, plot)
 
 
 def position_at(result: xr.Dataset, place: str | float) -> int:
@@ -140,27 +134,3 @@ def position_at(result: xr.Dataset, place: str | float) -> int:
 def drawable(result: xr.Dataset) -> list[str]:
     """The kinds of figures that a result has something for."""
     return [name for name in PLOTS if name not in READY or READY[name](result)]
-
-
-def check_figure(path: Path) -> str:
-    """The format that a figure would be written in, by the extension; MechanismError if it is none."""
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in FORMATS:
-        raise MechanismError(Finding("is no kind of figure", str(path), "end the name in .png, .svg, .pdf or .jpg"))
-    return kind
-
-
-def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
-    """Write a figure by its extension, whole or not at all; the same figure gives the same file.
-
-    Raises MechanismError for another extension than .png, .svg, .pdf and .jpg, and where it cannot be written.
-    """
-    target = Path(path)
-    kind = check_figure(target)
-    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    made = BytesIO()  # written by Python: where the disk is full, matplotlib's PDF raises what is no OSError
-    with whole(target) as draft:
-        with rc_context({"svg.hashsalt": "trunnion"}):
-            figure.savefig(made, format=kind, dpi=200, metadata=undated)
-        draft.write_bytes(made.getbuffer())
-    return target

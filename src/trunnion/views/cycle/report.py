@@ -21,11 +21,10 @@ from trunnion.cycle.locking_course import HEAD
 from trunnion.files import whole
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, quantity
-from trunnion.views.common.bundle import bundle, web_text
-from trunnion.views.common.cycle import abscissa, column, intervals, names
+from trunnion.views.axis import abscissa, column, intervals, names
 from trunnion.views.cycle.deviations import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
-from trunnion.views.page import hashed, headline, inputs_of, said, template
+from trunnion.views.page import bundle, hashed, headline, inputs_of, said, template, web_text
 
 if TYPE_CHECKING:
     import xarray as xr

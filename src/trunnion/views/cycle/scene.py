@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.joints.pairs import GUIDED
-from trunnion.results.attributes import units_of
+from trunnion.results.attributes import attribute, units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import (
+from trunnion.views.axis import (
     abscissa,
     column,
-    course,
+    ease,
     intervals,
+    is_spatial,
     larger_end,
     layout,
     members,
@@ -27,10 +28,8 @@ from trunnion.views.common.cycle import (
     numbers,
     series,
 )
-from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.courses import varying
 from trunnion.views.cycle.deviations import built, losses
-from trunnion.views.space.bodies import is_spatial
 from trunnion.views.space.scene import space_scene
 
 if TYPE_CHECKING:
@@ -103,6 +102,14 @@ def scene(
     for load in drawn["loads"]:
         load["course"] = course(result, picked, load["name"])
     return drawn
+
+
+def course(result: xr.Dataset, picked: NDArray[np.intp], load: str) -> dict[str, list[list[float | None]]] | None:
+    """Force and moment of a load that varies at the picked positions, by component; None if they are not known."""
+    loads = attribute(result, "load_courses", "{}").get(load)
+    if loads is None or any(len(part) != result.sizes["position"] for parts in loads.values() for part in parts):
+        return None
+    return {what: [[part[k] for k in picked] for part in parts] for what, parts in loads.items()}
 
 
 def _links(layout_of: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:

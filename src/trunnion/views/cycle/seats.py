@@ -11,8 +11,8 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import number, prefixed, quantity
+from trunnion.views.axis import Abscissa, Array, abscissa, names
 from trunnion.views.charts import Arrow, Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, silent
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
 from trunnion.views.cycle.deviations import Seats, losses, need, seat_angles, seated
 
 if TYPE_CHECKING:
@@ -151,5 +151,5 @@ def _courses(result: xr.Dataset) -> list[Chart]:
                 marks.append(Line(over.values[places], values[places], "contact lost", crosses))
         if marks:
             axis = Axis(title, angles=kind != "guide", margin=0.12)
-            charts.append(Chart(over, axis, [*silent(result, over), *marks], zero=True, legend=Legend(least=1)))
+            charts.append(Chart(over, axis, [*silent(result, over), *marks], zero=True, legend=Legend(1)))
     return charts

@@ -12,7 +12,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.views import draw
+from trunnion.views.axis import Abscissa, Array, abscissa, members, names, peak
 from trunnion.views.charts import (
     Axis,
     Chart,
@@ -21,18 +21,16 @@ from trunnion.views.charts import (
     Look,
     Mark,
     Panel,
+    Plot,
     Ring,
     Rule,
     check_kind,
     nth,
 )
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, members, names
-from trunnion.views.common.peaks import peak
 from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies, shown
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
 __all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "figure", "pictures", "sheet"]
 
@@ -45,7 +43,7 @@ MOST_SPOKES = 240  # forces drawn around a hole
 SIDE = 4.6  # of the figure of a hole, inches
 
 
-def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
+def figure(result: xr.Dataset, kind: str = "sheet") -> Plot:
     """One figure of KINDS; `sheet` has all over time."""
     check_kind(kind, KINDS)
     if kind == "sheet":
@@ -56,12 +54,12 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
         if not panels:
             what = "no pin of this motion is in play"
             raise MechanismError(Finding(what, "--kind orbit", "use --kind gaps for guides"))
-        return draw.figure("Pin in its hole", result, panels, len(panels), 0.4 + SIDE * len(panels))
+        return Plot("Pin in its hole", panels, len(panels), 0.4 + SIDE * len(panels))
     title, build = OVER_TIME[kind]
     motion = shown(result)
     chart = build(motion.rows, abscissa(motion.rows))
     chart = chart if kind == "phase" else _with_events(chart, motion)
-    return draw.figure(title, result, [Panel("", [chart], 3.75)])
+    return Plot(title, [Panel("", [chart], 3.75)])
 
 
 def check_contacts(kind: str, in_play: bool) -> None:
@@ -71,7 +69,7 @@ def check_contacts(kind: str, in_play: bool) -> None:
         raise MechanismError(Finding("no joint of this motion is in play", f"--kind {kind}", remedy))
 
 
-def sheet(result: xr.Dataset) -> Figure:
+def sheet(result: xr.Dataset) -> Plot:
     """Everything over time, one panel under the other."""
     motion = shown(result)
     idle = () if np.any(motion.rows["drive_effort"].values) else ("effort",)  # nothing drives it
@@ -79,10 +77,10 @@ def sheet(result: xr.Dataset) -> Figure:
     over = abscissa(motion.rows)
     charts = [_with_events(build(motion.rows, over), motion)
               for kind, (_, build) in OVER_TIME.items() if kind not in left_out]  # fmt: skip
-    return draw.figure("Motion in time", result, [Panel("", charts, 0.4 + PANEL * len(charts))])
+    return Plot("Motion in time", [Panel("", charts, 0.4 + PANEL * len(charts))])
 
 
-def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
+def pictures(result: xr.Dataset) -> Iterator[tuple[str, Plot]]:
     """What a report has beside the courses, with what it shows: the ways of pins in their holes."""
     if "contact" in result.dims and _pins(result):
         yield "The ways of the pins in their holes, with the forces on the walls", figure(result, "orbit")
@@ -135,7 +133,7 @@ def _with_events(chart: Chart, motion: Shown) -> Chart:
         first = event.word not in [before.word for before in events[:k]]
         at, look = float(over.values[-1] * min(event.time, last) / last), looks[words.index(event.word)]
         marks.append(Rule(at, event.word if first else None, look))
-    return replace(chart, marks=[*chart.marks, *marks], legend=Legend(least=1))
+    return replace(chart, marks=[*chart.marks, *marks], legend=Legend(1))
 
 
 # ---- contacts -----------------------------------------------------------------------------------------------------

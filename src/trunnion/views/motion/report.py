@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.views.common.cycle import abscissa, members, series
+from trunnion.views.axis import abscissa, members, series
 from trunnion.views.cycle.report import page
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import pictures
@@ -39,7 +39,7 @@ def report(result: xr.Dataset) -> str:
                    for event in events],
         "more": len(motion.events) - len(events),
         "account": _account(motion.rows),
-        "pictures": [{"alt": title, "source": source(drawn)} for title, drawn in pictures(result)],
+        "pictures": [{"alt": title, "source": source(result, drawn)} for title, drawn in pictures(result)],
     }  # fmt: skip
     return page(motion.rows, motion_scene(motion), over, _residual(motion))
 

@@ -17,12 +17,12 @@ from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.views.common.cycle import Array, layout, members
+from trunnion.views.axis import Array, layout, members
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["BodyPose", "Space", "gathered", "is_spatial", "space"]
+__all__ = ["BodyPose", "Space", "gathered", "space"]
 
 PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
 NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
@@ -177,11 +177,6 @@ class Space:
     def seated(self, joint: str) -> Array:
         """Track of a joint's symbol, (3, position)."""
         return self.poses[self.joints[joint]["links"][1]].place(self.seat(joint))
-
-
-def is_spatial(result: xr.Dataset) -> bool:
-    """Whether a result is of a mechanism in space."""
-    return layout(result).get("space") == "spatial"
 
 
 def space(result: xr.Dataset) -> Space:

@@ -15,10 +15,9 @@ from matplotlib.patheffects import Normal, Stroke
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import Array, members
+from trunnion.views.axis import Array, ease, members, usual_peak
 from trunnion.views.common.drawing import PALE, bare, closes, facts, short
-from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, new
-from trunnion.views.common.peaks import ease, usual_peak
+from trunnion.views.draw import INK, MUTED, PALETTE, Labels, new
 from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.solids import HALF, Scenery, Solid, scenery
 

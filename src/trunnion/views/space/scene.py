@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.joints.pairs import PAIRS
-from trunnion.views.common.cycle import Array, column, names, series
+from trunnion.views.axis import Array, column, names, series
 from trunnion.views.space.bodies import Space, gathered
 from trunnion.views.space.solids import best, looking, scenery
 

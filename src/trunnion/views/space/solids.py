@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.joints.pairs import PAIRS
-from trunnion.views.common.cycle import Array
+from trunnion.views.axis import Array
 from trunnion.views.space.bodies import Space
 
 __all__ = ["Camera", "Scenery", "Solid", "best", "looking", "scenery", "solids"]

@@ -248,7 +248,7 @@ _VIEWS = (
     ),
     Fault(
         "runs-are-not-closed",
-        "views/common/peaks.py",
+        "views/axis.py",
         "first = int(np.flatnonzero(~within)[0]) if closed else 0",
         "first = 0",
         ("tests/views/test_peaks.py",),

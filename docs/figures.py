@@ -130,8 +130,8 @@ class _Drawing:
 
     def _draw(self, folder: Path) -> dict[str, bytes]:
         from trunnion import analyse, assemble, plot, read, report
-        from trunnion.views.assembly.mode_drawings import ways
         from trunnion.views.draw import save
+        from trunnion.views.mode_drawings import ways
 
         if (EXAMPLES / f"{self.base}.yaml").is_file():
             mechanism = self.gallery.model(self.base)

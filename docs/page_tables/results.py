@@ -142,7 +142,7 @@ def status_table() -> str:
 
 def plots_table() -> str:
     """Every plot."""
-    from trunnion.views.cycle.plots import PLOTS
+    from trunnion.views.cycle import PLOTS
 
     return rows_of(
         ("kind", "shows"), [(code(name), (inspect.getdoc(f) or "").splitlines()[0]) for name, f in PLOTS.items()]

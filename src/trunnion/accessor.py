@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
 
-    from trunnion.views.cycle.report import Animation
+    from trunnion.views.report import Animation
 
 __all__ = ["Accessor"]
 

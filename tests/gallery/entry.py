@@ -44,7 +44,7 @@ class Entry:
     says: the fact in words that its figure completes ("Stroke of the piston"); unit: SI unit of the figure, `rad` is
     shown in degrees; found: the figure by Trunnion; expected: the same by other means, without Trunnion; source: what
     means and whose, as follows on "By" ("the closed form 2 r"); tolerance: how far apart they may be, in the unit.
-    figures: kinds of `views.cycle.plots.PLOTS`, the mechanism first, or `assemble`, the figure of that verb; lost:
+    figures: kinds of `views.cycle.PLOTS`, the mechanism first, or `assemble`, the figure of that verb; lost:
     positions of the `STEPS` that may be without forces; errors: parts of findings of severity error that belong to the
     example.
     """

@@ -19,7 +19,7 @@ from trunnion.cli.options import PLOT_KINDS, over, points
 from trunnion.cli.terminal import QUIET, say, show_rows
 from trunnion.cycle.vocabulary import NamedNumber, vocabulary
 from trunnion.errors import Finding, Severity
-from trunnion.views.cycle.plots import PLOTS
+from trunnion.views.cycle import PLOTS
 
 FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
 STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}

@@ -27,7 +27,7 @@ from trunnion.errors import Severity
 from trunnion.solve.assembly_modes import GroupModes, choices, put_together
 from trunnion.solve.hints import hints
 from trunnion.solve.run import prepare
-from trunnion.views.assembly.modes import places
+from trunnion.views.assembly import places
 
 START = np.array([0.0])
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"

@@ -19,7 +19,7 @@ from trunnion.dynamics.measured import figures_in_time
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
-from trunnion.views.motion.shown import ENERGIES
+from trunnion.views.motion import ENERGIES
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

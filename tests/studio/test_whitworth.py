@@ -7,7 +7,7 @@ import pytest
 
 from studio.asking import analysed, ask, edited, solved
 from trunnion.model.file import entries_of
-from trunnion.views.cycle.scene import scene
+from trunnion.views.scene import scene
 
 TEXT = """\
 trunnion: 1

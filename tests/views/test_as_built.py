@@ -10,11 +10,11 @@ import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
 
 import trunnion
-from trunnion.views.cycle.deviations import (
+from trunnion.views.as_built import (
     losses,
     seated,
 )
-from trunnion.views.cycle.scene import scene
+from trunnion.views.scene import scene
 from trunnion.views.shown import figure_of
 
 

@@ -27,10 +27,9 @@ from trunnion.dynamics.result import spectrum
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.tables import columns
-from trunnion.views.cycle.scene import scene
-from trunnion.views.motion.figure import KINDS, OF_CONTACTS
-from trunnion.views.motion.report import motion_scene, report
-from trunnion.views.motion.shown import shown
+from trunnion.views.motion import KINDS, OF_CONTACTS, shown
+from trunnion.views.report import motion_scene, report
+from trunnion.views.scene import scene
 from trunnion.views.shown import figure_of
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}

@@ -13,7 +13,7 @@ import trunnion
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
 from trunnion.views.axis import abscissa
-from trunnion.views.cycle.plots import PLOTS, READY, mechanism
+from trunnion.views.cycle import PLOTS, READY, mechanism
 from trunnion.views.draw import save
 from trunnion.views.shown import figure_of
 

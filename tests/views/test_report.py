@@ -16,9 +16,9 @@ from stand_in_tolerances import CASES
 
 import trunnion
 from trunnion import play, read, sweep
-from trunnion.views.cycle.report import embedded, report
 from trunnion.views.page import bundle
 from trunnion.views.play import tables as play_tables
+from trunnion.views.report import embedded, report
 from trunnion.views.tolerance import drawable, readings
 from trunnion.views.tolerance import report as tolerance_report
 

@@ -18,8 +18,8 @@ from trunnion import Mechanism, read
 from trunnion import analyse as analysed
 from trunnion.errors import Status
 from trunnion.results.attributes import summary_of
-from trunnion.views.cycle.report import report
-from trunnion.views.cycle.scene import scene
+from trunnion.views.report import report
+from trunnion.views.scene import scene
 
 
 def test_every_kind_of_result_becomes_plain_json(case):

@@ -14,15 +14,13 @@ from test_report import Page
 
 from trunnion.errors import MechanismError, Status
 from trunnion.results.tables import columns
-from trunnion.views.cycle.plots import PLOTS, READY, mechanism
-from trunnion.views.cycle.report import report
-from trunnion.views.cycle.scene import scene
+from trunnion.views.bodies import SYMBOLS, best, looking, scenery, solids, space
+from trunnion.views.cycle import PLOTS, READY, mechanism
 from trunnion.views.draw import save
+from trunnion.views.picture import facets
+from trunnion.views.report import report
+from trunnion.views.scene import scene, screw_axis
 from trunnion.views.shown import figure_of
-from trunnion.views.space.bodies import space
-from trunnion.views.space.figure import facets
-from trunnion.views.space.scene import screw_axis
-from trunnion.views.space.solids import SYMBOLS, best, looking, scenery, solids
 
 BLANK = ("nowhere", "locked")  # no position can be drawn
 

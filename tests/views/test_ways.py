@@ -8,8 +8,8 @@ from matplotlib.colors import to_hex
 import trunnion
 from mechanisms import MODELS, build, stephenson_six_bar, watt_six_bar
 from trunnion.errors import MechanismError
-from trunnion.views.assembly.mode_drawings import ways
 from trunnion.views.draw import INK, RULE, save
+from trunnion.views.mode_drawings import ways
 
 
 def panels(figure):

@@ -47,8 +47,8 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
     line(mechanism.name or model.file.name, "bold")
     _show_structure(checked, len(mechanism.drivers))
     if assemblies:
-        from trunnion.views.assembly.mode_drawings import ways as drawings
         from trunnion.views.draw import save
+        from trunnion.views.mode_drawings import ways as drawings
 
         save(drawings(mechanism, checked.choices), assemblies)
         wrote(assemblies)
@@ -57,7 +57,7 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
 
 def _show_structure(checked: "Check", drivers: int) -> None:
     """Mobility, structural formula, and modules with the ways to assemble them, a line each."""
-    from trunnion.views.assembly.modes import lines
+    from trunnion.views.assembly import lines
 
     rank = checked.rank_mobility
     by_rank = "by rank unknown: no position can be assembled" if rank is None else f"{rank} by rank"

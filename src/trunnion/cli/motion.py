@@ -80,7 +80,7 @@ def plot(
     """Plot a cycle: torque, friction power, reactions, mechanism."""
     from trunnion.views.axis import whole_peaks
     from trunnion.views.charts import check_kind
-    from trunnion.views.cycle.plots import PLOTS, drawable
+    from trunnion.views.cycle import PLOTS, drawable
     from trunnion.views.draw import save
     from trunnion.views.shown import figure_of
 
@@ -165,7 +165,7 @@ def simulate(
     contacts = bool(in_play(mechanism))  # else there are none to write or draw
     check_files(files, "cycle" if steady else "motion", kind if files.out else None, in_play=contacts)
     if kind and files.out:
-        from trunnion.views.motion.figure import check_contacts  # with matplotlib
+        from trunnion.views.motion import check_contacts  # with matplotlib
 
         check_contacts(kind, contacts)
     with model.lines(), bar("%", PERCENT) as progress:

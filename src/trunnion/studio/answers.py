@@ -54,9 +54,8 @@ from trunnion.studio.sketch import Sketch, Vector
 from trunnion.studio.strokes import add_point, held, join, link, move, pinned, slide, vector
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
-from trunnion.views.cycle.blocks import blocks_of
-from trunnion.views.cycle.scene import scene
-from trunnion.views.space.bodies import gathered
+from trunnion.views.bodies import gathered
+from trunnion.views.scene import blocks_of, scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -422,8 +421,8 @@ def _compare(question: Asked) -> dict[str, Any]:
 def _export(question: Asked) -> dict[str, Any]:
     """A file of the solved cycle, its table, report or a picture of the position `index`: name, type and bytes."""
     from trunnion.results.save import frame
-    from trunnion.views.cycle.plots import mechanism
-    from trunnion.views.cycle.report import report
+    from trunnion.views.cycle import mechanism
+    from trunnion.views.report import report
 
     state, what, steps = question.state, str(question["what"]), question.steps
     if state.bare:  # its file would be one without friction

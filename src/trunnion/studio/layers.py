@@ -18,8 +18,8 @@ from trunnion.solve.shifts import play_of
 from trunnion.studies.design import instant_centres, transmission_angles
 from trunnion.studio.message import Exact
 from trunnion.studio.placed import column
-from trunnion.views.cycle.deviations import seated
-from trunnion.views.cycle.scene import scene
+from trunnion.views.as_built import seated
+from trunnion.views.scene import scene
 
 if TYPE_CHECKING:
     import xarray as xr

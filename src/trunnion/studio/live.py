@@ -150,7 +150,7 @@ def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int)
     """A mechanism in space with some numbers replaced: its scene, for bodies change with numbers, and its margin."""
     from trunnion.cycle.positions import positions  # not for the first picture
     from trunnion.cycle.summary import result_of
-    from trunnion.views.cycle.scene import scene
+    from trunnion.views.scene import scene
 
     changed = prepare(run.system.mechanism.with_values(values)) if values else run
     with np.errstate(all="ignore"):

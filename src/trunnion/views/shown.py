@@ -27,12 +27,12 @@ from trunnion.views.page import with_code
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from trunnion.views.cycle.report import Animation
+    from trunnion.views.report import Animation
 
 # kind of result: the modules in which its `figure` and its `report` stand; loaded when they are asked for
 VIEWS = {
-    "cycle": ("cycle.plots", "cycle.report"), "motion": ("motion.figure", "motion.report"),
-    "sweep": ("sweep", "sweep"), "play": ("play", "play"), "assembly": ("assembly.figure", "assembly.figure"),
+    "cycle": ("cycle", "report"), "motion": ("motion", "report"),
+    "sweep": ("sweep", "sweep"), "play": ("play", "play"), "assembly": ("assembly", "assembly"),
     "tolerance": ("tolerance", "tolerance"), "allocation": ("allocation", "allocation"),
     "comparison": ("compare", "compare"), "identification": ("identify", "identify"),
 }  # fmt: skip
@@ -126,7 +126,7 @@ CELL = "text-align:left;padding:1px 12px 1px 0;vertical-align:top"
 def mechanism_figure(mechanism: Mechanism) -> Figure:
     """The mechanism at the first position of its cycle that can be assembled; MechanismError if there is none."""
     from trunnion.cycle.analyse import drawable
-    from trunnion.views.cycle.plots import mechanism as drawing
+    from trunnion.views.cycle import mechanism as drawing
 
     result = drawable(mechanism)
     points = result["point_position"].values

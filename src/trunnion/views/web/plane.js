@@ -216,7 +216,7 @@ function travel(scene, one) {
 /**
  * A driven slide between two links that are pinned at their other ends, as a barrel with its rod; null for another: if no
  * driver moves it, a link has more joints, the eyes lie off the guide, or the stroke is longer than a barrel could be.
- * The rule is that of trunnion/views/common/drawing.py.
+ * The rule is that of trunnion/views/sketch.py.
  */
 function cylinder(scene, one, tint) {
   const eyes = one.links.map((name) => scene.links.find((link) => link.name === name)?.points.filter((key) => key !== `${name}.${one.name}`) ?? []);

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,21 +14,15 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, choices, put_together
 from trunnion.solve.run import prepare
-from trunnion.views.assembly.modes import some
-from trunnion.views.common.drawing import name_points, picture
-from trunnion.views.common.drawing import sketch as sketch_plane
+from trunnion.views import picture, sketch
+from trunnion.views.assembly import some
+from trunnion.views.bodies import Camera, best, looking, scenery, space
 from trunnion.views.draw import INK, MUTED, RULE, Labels, new, plain
-from trunnion.views.space.bodies import space
-from trunnion.views.space.figure import name_joints
-from trunnion.views.space.figure import sketch as sketch_space
-from trunnion.views.space.solids import Camera, best, looking, scenery
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["ways"]
 
 MOST_DRAWN = 24  # ways of one group
 SYMBOLS = 1.25  # size of joints and bearings, as if the mechanism were so much larger
@@ -55,19 +48,18 @@ def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Fi
     if not groups:
         what = "no group has more than one assembly mode: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
-    spatial = mechanism.space == "spatial"
+    spatial, cameras, rows = mechanism.space == "spatial", list[Camera](), []
     result = analyse(mechanism.with_friction("off"), 1)
-    make = partial(_in_space, camera=[]) if spatial else _in_plane
-    rows = []
     for choice in groups:
         rows.append(list[Cell]())
         for mode in some(choice, MOST_DRAWN // 2 if spatial else MOST_DRAWN):
             try:
-                rows[-1].append(make(_run(mechanism, choice, mode), choice, mode))
+                found = _run(mechanism, choice, mode)
+                rows[-1].append(_in_space(found, choice, mode, cameras) if spatial else _in_plane(found, choice, mode))
             except MechanismError:
                 rows[-1].append(Cell(mode, None, lambda axes, *_: _remark(axes, "cannot be assembled in this mode")))
     columns, width = (3, 2.9) if spatial else (4, 2.4)
-    return _sheet(result, groups, rows, columns, width)
+    return _sheet(result, groups, rows, min(columns, max(map(len, rows))), width)
 
 
 def _sheet(
@@ -77,32 +69,28 @@ def _sheet(
     boxes = np.array([cell.box for row in rows for cell in row if cell.box] or [(0.0, 0.0, 1.0, 1.0)])
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
-    (left, below), (right, above) = (low - 0.08 * size).tolist(), (high + 0.08 * size).tolist()
-    box = (left, below - 0.03 * size, right, above)  # a bearing reaches below its joint
-    columns = min(columns, max(map(len, rows)))
-    tall = width * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.45), 1.6) + 0.28
-    heights = [0.3 + math.ceil(len(row) / columns) * tall for row in rows]
+    low, high = low - np.array([0.08, 0.11]) * size, high + 0.08 * size  # a bearing reaches below its joint
+    across, up = high - low
+    heights = [0.3 + math.ceil(len(row) / columns) * (width * min(max(up / across, 0.45), 1.6) + 0.28) for row in rows]
     figure = new("Assembly modes", result, 0.6 + sum(heights), max(columns, 2) * width + 0.2)
-    parts = figure.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
-    labels, extent = Labels(figure), float(np.hypot(box[2] - box[0], box[3] - box[1]))
-    for part, choice, row in zip(parts, groups, rows, strict=True):
+    strips = figure.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
+    labels = Labels(figure)
+    for strip, choice, row in zip(strips, groups, rows, strict=True):
         where = f", at {choice.where}" if choice.where else ""
         more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
         head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
-        part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
-        grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel().tolist()
+        strip.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
+        grid = strip.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel().tolist()
         for axes in grid[len(row) :]:
             axes.set_visible(False)
         for axes, cell in zip(grid, row, strict=False):
             axes.set_aspect("equal")
-            axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[])
             used = cell.way.taken  # its frame is bold
-            for spine in axes.spines.values():
-                spine.set(color=INK if used else RULE, linewidth=1.8 if used else 1.0)
+            axes.spines[:].set(color=INK if used else RULE, linewidth=1.8 if used else 1.0)
             title = plain(f"{choice.link}: {cell.way.name}" + "  used" * used)
-            weight = "bold" if used else "normal"
-            axes.set_title(title, fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
-            cell.draw(axes, extent, labels)
+            axes.set_title(title, fontsize=8.5, fontweight="bold" if used else "normal", color=INK, loc="left", pad=4)
+            cell.draw(axes, float(np.hypot(across, up)), labels)
     labels.place()
     return figure
 
@@ -124,31 +112,29 @@ def _remark(axes: Axes, text: str) -> None:
 
 def _in_plane(result: xr.Dataset, choice: GroupModes, mode: AssemblyMode) -> Cell:
     """The whole mechanism, as far as it is assembled, with the names of the joints of the group."""
-    drawing = replace(picture(result), weight=0.5, only=choice.links)
+    drawing = replace(sketch.picture(result), weight=0.5, only=choice.links)
     index = int(np.argmin(np.abs(result["time"].values - choice.time)))
-    missing = [
-        link for link in drawing.moving if link in drawing.angles and not np.isfinite(drawing.angles[link][index])
-    ]
+    missing = [link for link in drawing.moving if not np.isfinite(drawing.angles.get(link, np.zeros(index + 1))[index])]
 
     def draw(axes: Axes, size: float, labels: Labels) -> None:
         symbols = replace(drawing, size=SYMBOLS * size)
-        sketch_plane(axes, symbols, index)
-        name_points(axes, symbols, index, labels, list(mode.joints))
+        sketch.sketch(axes, symbols, index)
+        sketch.name_points(axes, symbols, index, labels, list(mode.joints))
         if missing:
             _remark(axes, f"not assembled here: {', '.join(missing)}")
 
     return Cell(mode, drawing.box, draw)
 
 
-def _in_space(result: xr.Dataset, choice: GroupModes, mode: AssemblyMode, camera: list[Camera]) -> Cell:
-    """The same in space; camera: that of the first drawing, from which all are seen."""
+def _in_space(result: xr.Dataset, choice: GroupModes, mode: AssemblyMode, cameras: list[Camera]) -> Cell:
+    """The same in space; cameras: that of the first drawing, from which all are seen."""
     bodies = space(result)
-    camera[:] = camera or [looking(*best(bodies))]
-    look, places = scenery(bodies, camera[0]), np.flatnonzero(bodies.drawable)
+    cameras[:] = cameras or [looking(*best(bodies))]
+    look, places = scenery(bodies, cameras[0]), np.flatnonzero(bodies.drawable)
     index = int(places[np.argmin(np.abs(result["time"].values[places] - choice.time))])
 
     def draw(axes: Axes, size: float, labels: Labels) -> None:
-        sketch_space(axes, look, index, choice.links)
-        name_joints(axes, look, index, labels, tuple(mode.joints), 7.5)
+        picture.sketch(axes, look, index, choice.links)
+        picture.name_joints(axes, look, index, labels, tuple(mode.joints), 7.5)
 
     return Cell(mode, look.box, draw)

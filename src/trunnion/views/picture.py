@@ -16,17 +16,13 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
 from trunnion.views.axis import Array, ease, members, usual_peak
-from trunnion.views.common.drawing import PALE, bare, closes, facts, short
+from trunnion.views.bodies import HALF, Scenery, Solid, Space, scenery, space
 from trunnion.views.draw import INK, MUTED, PALETTE, Labels, new
-from trunnion.views.space.bodies import Space, space
-from trunnion.views.space.solids import HALF, Scenery, Solid, scenery
+from trunnion.views.sketch import PALE_LINK, bare, closes, facts, short
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-__all__ = ["facets", "mechanism", "name_joints", "normal_of", "sketch"]
-
 
 GREY = "#9aa3ad"  # of the ground
 REACTION = "#c01f2e"
@@ -44,7 +40,12 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
         what = f"position {index} cannot be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, "index", "choose a solved position"))
     arrows, most = _reactions(look, result, index)
-    low, high = _limits(look, arrows)
+    margin = 0.07 * look.diagonal  # around all that may be seen, with the key below, and no narrow strip
+    reach = np.array([look.box[:2], look.box[2:], *(end for _, end in arrows)])
+    low, high = reach.min(axis=0) - margin * np.array([1.0, 2.6]), reach.max(axis=0) + margin
+    width, height = high - low
+    more = np.array([max(0.0, height * 7.2 / HEIGHTS[1] - width), max(0.0, width * HEIGHTS[0] / 7.2 - height)]) / 2
+    low, high = low - more, high + more
     figure = new("Mechanism", result, float(np.clip(7.2 * (high - low)[1] / (high - low)[0], *HEIGHTS)) + 0.7)
     where, *others = facts(result, index)
     where += ", where the load of a joint is largest" * bool(arrows and telling)
@@ -58,19 +59,6 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     _key(axes, look, most)
     labels.place()
     return figure
-
-
-def _limits(look: Scenery, arrows: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Corners below left and above right of the figure (m): all that may be seen, the key below, no narrow strip."""
-    margin = 0.07 * look.diagonal
-    reach = np.array([look.box[:2], look.box[2:], *(end for _, end in arrows)])
-    low, high = reach.min(axis=0) - margin, reach.max(axis=0) + margin
-    low[1] -= 1.6 * margin
-    width, height = high - low
-    wider = max(0.0, height * 7.2 / HEIGHTS[1] - width) / 2
-    taller = max(0.0, width * HEIGHTS[0] / 7.2 - height) / 2
-    more = np.array([wider, taller])
-    return low - more, high + more
 
 
 def _telling(result: xr.Dataset, bodies: Space) -> int:
@@ -133,7 +121,7 @@ def _colour(bodies: Space, name: str, only: tuple[str, ...]) -> str:
     if name == bodies.ground:
         return GREY
     if only and name not in only:
-        return PALE
+        return PALE_LINK
     return PALETTE[bodies.moving.index(name) % len(PALETTE)]
 
 

@@ -1,4 +1,4 @@
-"""What a result tells of errors and seats, for figures and report: worst points, outputs, losses of contact, seats."""
+"""Errors and seats of a result, for figures, report and browser: worst points, outputs, losses of contact, seats."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
-from trunnion.results.quantities import Units, number, prefixed, quantity
+from trunnion.results.quantities import number, prefixed, quantity
 from trunnion.results.scales import without_noise
 from trunnion.views.axis import (
     Array,
@@ -25,21 +25,17 @@ from trunnion.views.axis import (
     numbers,
     peak,
     valid,
-)
-from trunnion.views.space.bodies import Space, gathered
+)  # fmt: skip
+from trunnion.views.bodies import Space, gathered
+from trunnion.views.page import NONE
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "Output", "Seats", "built", "error_rows", "has", "loss_rows", "losses", "need", "outputs", "point_errors",
-    "seat_angles", "seated", "worst_points",
-]  # fmt: skip
-
-
 JUMP = 60.0  # °: a seat that turns by more from one position to the next is taken to have jumped
 LEAST = 0.1  # of the largest error of place: points below it are not among the worst
 ALIKE = 1e-3  # of the largest: two curves nearer than this are one
+MOST_WORST, MOST_PLACES = 4, 12
 # what a result may lack, and what to do
 LACKS = {
     "errors": ("the mechanism has no errors",
@@ -49,14 +45,9 @@ LACKS = {
 }  # fmt: skip
 
 
-def has(result: xr.Dataset, part: str) -> bool:
-    """Whether a result has "errors", or "seats" that are known anywhere."""
-    return "point_error" in result if part == "errors" else bool(seated(result))
-
-
 def need(result: xr.Dataset, part: str, figure: str) -> None:
-    """MechanismError with the reason if a result lacks the part that a figure shows."""
-    if has(result, part):
+    """MechanismError with the reason if a result lacks "errors", or "seats" that are known anywhere, of a figure."""
+    if "point_error" in result if part == "errors" else seated(result):
         return
     what, remedy = LACKS[part]
     if part == "seats" and "seat_offset" in result:
@@ -64,7 +55,7 @@ def need(result: xr.Dataset, part: str, figure: str) -> None:
     raise MechanismError(Finding(f"{what}, and there is no figure '{figure}'", "--kind", remedy))
 
 
-# ---- errors ---------------------------------------------------------------------------------------------------
+# ---- errors and seats -----------------------------------------------------------------------------------------------
 
 
 def point_errors(result: xr.Dataset) -> dict[str, Array]:
@@ -73,14 +64,14 @@ def point_errors(result: xr.Dataset) -> dict[str, Array]:
     return {key: size for key, size in sizes.items() if peak(size) > 0}
 
 
-def worst_points(result: xr.Dataset, most: int = 4) -> dict[str, Array]:
+def worst_points(result: xr.Dataset) -> dict[str, Array]:
     """The points with the largest errors of place, worst first; of those that err alike one."""
     errors = point_errors(result)
     tops = {key: peak(error) for key, error in errors.items()}
     worst, picked = max(tops.values(), default=0.0), dict[str, Array]()
     for key in sorted(errors, key=lambda key: (-tops[key], key)):
         alike = any(np.nanmax(np.abs(errors[key] - other)) < ALIKE * worst for other in picked.values())
-        if tops[key] >= LEAST * worst and not alike and len(picked) < most:
+        if tops[key] >= LEAST * worst and not alike and len(picked) < MOST_WORST:
             picked[key] = errors[key]
     return picked
 
@@ -94,18 +85,18 @@ class Output(NamedTuple):
 
     @property
     def label(self) -> str:
+        """What it is of, in words."""
         return f"{'slide' if self.unit == 'm' else 'rotation'} of {self.joint}"
 
 
 def outputs(result: xr.Dataset) -> list[Output]:
     """Transmission errors, as the summary of the result has them."""
     facts, drivers, picked = layout(result), names(result, "driver"), []
-    turns, slides = (members(result, f"joint_{what}_error", "joint") for what in ("rotation", "slide"))
     for joint in names(result, "joint"):
         about = facts["joints"].get(joint, {})
         if facts["ground"] in about.get("links", ()) and joint not in drivers:
             guided = PAIRS[about["type"]].guided
-            error = (slides if guided else turns).get(joint)
+            error = column(result, f"joint_{'slide' if guided else 'rotation'}_error", joint=joint)
             if error is not None and np.isfinite(error).any():
                 picked.append(Output(joint, "m" if guided else "rad", error))
     return picked
@@ -115,9 +106,6 @@ def losses(result: xr.Dataset) -> dict[str, NDArray[np.intp]]:
     """Positions at which each joint loses contact, of those that do."""
     lost = {joint: np.flatnonzero(row > 0) for joint, row in members(result, "contact_lost", "joint").items()}
     return {joint: places for joint, places in lost.items() if places.size}
-
-
-# ---- seats ----------------------------------------------------------------------------------------------------
 
 
 class Seats(NamedTuple):
@@ -144,6 +132,7 @@ class Seats(NamedTuple):
 
     @property
     def planar_guide(self) -> bool:
+        """Whether it is a guide of the plane, which has offsets across it alone."""
         return self.kind == "guide" and self.offsets.shape[1] == 2
 
 
@@ -173,62 +162,56 @@ def seat_angles(result: xr.Dataset) -> list[tuple[str, str, Array]]:
     ]  # fmt: skip
 
 
-# ---- tables ---------------------------------------------------------------------------------------------------------
+# ---- tables of the report -------------------------------------------------------------------------------------------
 
-
-MOST_PLACES = 12
 Row = dict[str, str]
 
 
 def error_rows(result: xr.Dataset) -> list[Row]:
-    """Label, as built, ideal, difference and place of what errors change; none of a mechanism without errors."""
+    """Label, as built, ideal, difference and place of what errors change; none of a mechanism without errors.
+
+    Of courses the largest as built and ideal, where contact is not lost; of errors the largest alone.
+    """
     if "point_error" not in result:
         return []
     result = without_noise(result)
-    errors = [(f"Position error of {key}, largest", error, "m") for key, error in worst_points(result).items()]
-    errors += [
-        (f"Transmission error, {output.label}, largest", output.error, output.unit) for output in outputs(result)
-    ]
-    rows = [_largest(result, label, error, None, unit) for label, error, unit in errors]
-    units = units_along(result["drive_effort"], "driver")
-    for name, dim, units_of_members in (("drive_effort", "driver", units), ("reaction_force", "joint", [])):
-        built, change = (members(result, f"{name}{end}", dim) for end in ("", "_change"))
-        for k, member in enumerate(built):
-            unit = units_of_members[k] if units_of_members else "N"
-            noun = f"Drive {'force' if unit == 'N' else 'torque'}" if units_of_members else "Reaction"
-            sizes = (np.abs(built[member]), np.abs(built[member] - change[member]))
-            if sizes[0].ndim > 1:
-                sizes = np.linalg.norm(sizes[0], axis=0), np.linalg.norm(sizes[1], axis=0)
-            rows.append(_largest(result, f"{noun} of {member}, largest", *sizes, unit))
+    over, units, rows = abscissa(result), units_of(result), list[Row]()
+
+    def row(label: str, built: float, ideal: float, unit: str, place: str = "") -> Row:
+        change = f"{'+' if built > ideal else ''}{quantity(built - ideal, unit, units)}"
+        ends = {key: quantity(value, unit, units)
+                for key, value in (("built", built), ("ideal", ideal))}  # fmt: skip
+        return {"label": label, **ends, "difference": change, "place": place}
+
+    def largest(label: str, unit: str, built: Array, ideal: Array | None = None) -> Row:
+        sizes, none = valid(result, built), "" if ideal is None else NONE
+        if not np.isfinite(sizes).any():
+            return {"label": label, "built": none, "ideal": none, "difference": NONE, "place": ""}
+        index = int(np.nanargmax(np.abs(sizes)))
+        place, value = over.say(index), float(sizes[index])
+        if ideal is None:
+            return {"label": label, "built": "", "ideal": "", "difference": quantity(value, unit), "place": place}
+        other = valid(result, ideal)
+        return row(label, value, float(np.nanmax(other)) if np.isfinite(other).any() else np.nan, unit, place)
+
+    rows += [largest(f"Position error of {key}, largest", "m", size) for key, size in worst_points(result).items()]
+    rows += [largest(f"Transmission error, {out.label}, largest", out.unit, out.error) for out in outputs(result)]
+    efforts, changes = (members(result, f"drive_effort{end}", "driver") for end in ("", "_change"))
+    for (driver, effort), unit in zip(efforts.items(), units_along(result["drive_effort"], "driver"), strict=True):
+        noun = "force" if unit == "N" else "torque"
+        rows.append(
+            largest(f"Drive {noun} of {driver}, largest", unit, np.abs(effort), np.abs(effort - changes[driver]))
+        )
+    forces, changes = (members(result, f"reaction_force{end}", "joint") for end in ("", "_change"))
+    for joint, force in forces.items():
+        sizes = (np.linalg.norm(vector, axis=0) for vector in (force, force - changes[joint]))
+        rows.append(largest(f"Reaction of {joint}, largest", "N", *sizes))
     lost, ideally = (float(sum(mean_friction(result, joint, of) for joint in names(result, "joint")))
                      for of in ("", "_ideal"))  # fmt: skip
-    share, ideal_share = (
-        float("nan") if (value := column(result, f"efficiency{of}")) is None else float(value) for of in ("", "_ideal")
+    built, free = (
+        np.nan if (value := column(result, f"efficiency{of}")) is None else float(value) for of in ("", "_ideal")
     )
-    return [*rows, _row("Friction power, mean", lost, ideally, "W", units_of(result)),
-            _row("Efficiency of the cycle", share, ideal_share, "1", None)]  # fmt: skip
-
-
-def _row(label: str, built: float, ideal: float, unit: str, units: Units | None, place: str = "") -> Row:
-    """As built, ideal, and the difference with its sign."""
-    change = f"{'+' if built > ideal else ''}{quantity(built - ideal, unit, units)}"
-    as_built, ideally = (quantity(value, unit, units) for value in (built, ideal))
-    return {"label": label, "built": as_built, "ideal": ideally, "difference": change, "place": place}
-
-
-def _largest(result: xr.Dataset, label: str, built: Array, ideal: Array | None, unit: str) -> Row:
-    """The largest of a course as built and, unless it is an error, ideally, where contact is not lost."""
-    sizes = valid(result, built)
-    if not np.isfinite(sizes).any():
-        none = "" if ideal is None else "—"
-        return {"label": label, "built": none, "ideal": none, "difference": "—", "place": ""}
-    index = int(np.nanargmax(np.abs(sizes)))
-    place, value = abscissa(result).say(index), float(sizes[index])
-    if ideal is None:
-        return {"label": label, "built": "", "ideal": "", "difference": quantity(value, unit), "place": place}
-    other = valid(result, ideal)
-    most = float(np.nanmax(other)) if np.isfinite(other).any() else float("nan")
-    return _row(label, value, most, unit, units_of(result), place)
+    return [*rows, row("Friction power, mean", lost, ideally, "W"), row("Efficiency of the cycle", built, free, "1")]
 
 
 def loss_rows(result: xr.Dataset) -> list[Row]:
@@ -239,17 +222,15 @@ def loss_rows(result: xr.Dataset) -> list[Row]:
         more = len(places) - MOST_PLACES
         rates = column(result, "contact_loss_number", joint=joint)
         any_rate = rates is not None and np.isfinite(rates).any()
-        most = f"{number(float(np.nanmax(rates)), 3)}\u00a0rad/(N\u00a0s)" if rates is not None and any_rate else "—"
+        most = f"{number(float(np.nanmax(rates)), 3)}\u00a0rad/(N\u00a0s)" if rates is not None and any_rate else NONE
         rows.append({"joint": joint, "places": f"{examples} and {more} more" if more > 0 else examples, "number": most})
     return rows
 
 
 # ---- for the browser ------------------------------------------------------------------------------------------------
 
-
 DIGITS = 5
 FAR, LEANT = 0.06, 0.2  # what is offered: the largest error of place as this share of the size, or of angle, rad
-FACTORS = (1.0, 2.0, 5.0)
 MOST = 1000.0
 SLIGHT = 1e-3  # a stretch of less than this share of the largest error of place is not told
 
@@ -260,11 +241,12 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         return None
     spatial = is_spatial(result)
     bodies, points = gathered(result) if spatial else None, members(result, "point_error", "point")
-    tracks = members(result, "point_position", "point").values()
-    places = np.concatenate([track.T for track in tracks]) if tracks else np.zeros((1, 2))
-    places = places[np.isfinite(places).all(axis=1)] if np.isfinite(places).any() else np.zeros((1, 2))
+    tracks = [track.T for track in members(result, "point_position", "point").values()]
+    places = np.concatenate(tracks or [np.empty((0, 2))])
+    places = places[np.isfinite(places).all(axis=1)]
+    size = bodies.size if bodies else float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
     return {
-        "preset": _preset(result, bodies.size if bodies else float(np.linalg.norm(np.ptp(places, axis=0)))),
+        "preset": _preset(result, size),
         "points": {} if spatial else {key: _vector(error) for key, error in points.items()},
         "links": _moved(result, bodies) if bodies
         else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
@@ -293,8 +275,8 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
 
 def _series(values: Array) -> list[float | None]:
     """Five digits of a series; one number if it never changes."""
-    rounded = [None if number is None else float(f"{number:.{DIGITS}g}") for number in numbers(values)]
-    return rounded[:1] if rounded and all(number == rounded[0] for number in rounded) else rounded
+    rounded = [None if value is None else float(f"{value:.{DIGITS}g}") for value in numbers(values)]
+    return rounded[:1] if rounded and all(value == rounded[0] for value in rounded) else rounded
 
 
 def _vector(values: Array) -> dict[str, list[float | None]]:
@@ -308,10 +290,7 @@ def _preset(result: xr.Dataset, size: float) -> float:
     if not most > 1:
         return 1.0
     base = 10.0 ** np.floor(np.log10(most))
-    return float(max(factor * base for factor in FACTORS if factor * base <= most * (1 + 1e-9)))
-
-
-# ---- the plane ------------------------------------------------------------------------------------------------
+    return float(max(factor * base for factor in (1.0, 2.0, 5.0) if factor * base <= most * (1 + 1e-9)))
 
 
 def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
@@ -334,14 +313,14 @@ def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
             left = error - shift - np.cross(turns[link], arm, axis=0)
             by = np.nan_to_num(np.nanmedian(np.einsum("jin,jn->in", pose.matrix, left), axis=1))
             name = key.split(".", 1)[1]
-            joint = bodies.joints.get(name)
-            within = joint is not None and link in joint["links"]
-            seated_at = bodies.seat(name, joint["links"].index(link)) if joint and within else places[key]
-            rows.append({"at": [float(f"{number:.7g}") for number in seated_at],
-                         "by": [float(f"{number:.5g}") for number in by]})  # fmt: skip
+            joint = bodies.joints.get(name, {"links": ()})
+            seat = bodies.seat(name, joint["links"].index(link)) if link in joint["links"] else places[key]
+            rows.append(
+                {"at": [float(f"{value:.7g}") for value in seat], "by": [float(f"{value:.5g}") for value in by]}
+            )
         stretched = max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest
         moved[link] = {
-            "about": [float(f"{number:.7g}") for number in about], "shift": _vector(shift),
+            "about": [float(f"{value:.7g}") for value in about], "shift": _vector(shift),
             "turn": _vector(turns[link]), "stretch": rows if stretched else [],
         }  # fmt: skip
     return moved

@@ -1,1 +1,0 @@
-"""Views of the ways in which a mechanism can be assembled, and of whether it can."""

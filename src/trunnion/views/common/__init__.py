@@ -1,1 +1,0 @@
-"""What all views share: one look, letters, numbers, scripts."""

@@ -1,1 +1,0 @@
-"""Views of a cycle: drawing, curves, report."""

@@ -10,6 +10,7 @@ import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
 
 import trunnion
+from drawn import labels, line
 from trunnion.views.as_built import (
     losses,
     seated,
@@ -28,23 +29,19 @@ def cardan():
     return loaded("pezzuti-cardan")
 
 
-def _label(axes, name):
-    return next(line for line in axes.lines if line.get_label() == name)
-
-
 @pytest.mark.slow
 def test_errors_are_those_of_the_result(slider):
     figure = figure_of(slider, "error")
     place, slide = figure.axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
-    assert _label(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
+    assert line(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
     assert place.get_ylabel() == "position error [µm]"
     wrong = slider.joint_slide_error.sel(joint="S").values
-    assert _label(slide, "S").get_ydata()[:-1] == pytest.approx(1e6 * wrong)
+    assert line(slide, "S").get_ydata()[:-1] == pytest.approx(1e6 * wrong)
     assert "slide [µm]" in slide.get_ylabel()
     dotted = [line for line in place.lines if str(line.get_linestyle()) == "--" and len(line.get_xdata()) == 2]
     assert len(dotted) >= len(np.unique(np.concatenate(list(losses(slider).values()))))
-    assert "contact lost: S" in [text.get_text() for text in place.get_legend().get_texts()]
+    assert "contact lost: S" in labels(place)
 
 
 def test_a_seat_that_is_given_is_drawn_where_it_is():

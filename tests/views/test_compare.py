@@ -11,11 +11,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from matplotlib.axis import Tick
-from matplotlib.text import Text
 from test_report import Page
 
 import trunnion
+from drawn import labels, outside, texts
 from rig_measurements import measured, rocker
 from trunnion.cli.app import main
 from trunnion.results.tables.studies import COMPARISON as TABLES
@@ -25,16 +24,6 @@ from trunnion.views.shown import figure_of as figure
 
 POWERS = ("torque", "speed", "brake", "out")
 FRICTION = "joint_defaults.friction.coefficient"
-
-
-def outside(drawn):
-    """Texts that lie beyond the edge of a figure."""
-    drawn.canvas.draw()
-    ticks = {id(text) for tick in drawn.findobj(Tick) for text in (tick.label1, tick.label2)}
-    boxes = [(text.get_text(), text.get_window_extent()) for text in drawn.findobj(Text) if id(text) not in ticks]
-    width, height = drawn.bbox.width, drawn.bbox.height
-    return [text for text, box in boxes
-            if text.strip() and (box.x0 < -1 or box.y0 < -1 or box.x1 > width + 1 or box.y1 > height + 1)]  # fmt: skip
 
 
 def settings(torques, speeds):
@@ -75,13 +64,13 @@ def test_every_figure_is_drawn_with_all_texts_in_it(name):
 
 def test_a_model_without_an_answer_is_a_gap_with_its_cause():
     axes = figure(case("locked")).axes[0]
-    assert any("model: locked" in text.get_text() for text in axes.texts)
+    assert any("model: locked" in text for text in texts(axes))
     assert np.isnan(axes.lines[0].get_ydata()).sum() == 1
 
 
 def test_courses_have_band_model_and_residual():
     above, below = figure(case("wrong"), "overlay", channel="torque").axes
-    assert [text.get_text() for text in above.get_legend().get_texts()] == ["±U (95\u00a0%)", "measured", "model"]
+    assert labels(above) == ["±U (95\u00a0%)", "measured", "model"]
     assert "offset only" in below.get_title(loc="right")
     residual = below.lines[1].get_ydata() if len(below.lines) > 1 else below.lines[0].get_ydata()
     assert np.nanmedian(residual) == pytest.approx(1.0, abs=0.05) or np.nanmedian(residual) == 0

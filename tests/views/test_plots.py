@@ -10,6 +10,7 @@ import pytest
 from stand_in import four_bar, slider
 
 import trunnion
+from drawn import line
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
 from trunnion.views.axis import abscissa
@@ -95,10 +96,6 @@ def test_a_drive_turning_backwards_closes_too(plain):
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def _line(axes, label):
-    return next(line for line in axes.lines if line.get_label() == label)
-
-
 def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
     data = trunnion.read(EXAMPLES / "slider-crank.yaml").data()
     data["measures"] = {
@@ -112,7 +109,7 @@ def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
     slide, angle = figure.axes
     assert slide.get_ylabel() == "slide of S [mm]"
     assert angle.get_ylabel() == "swing [°]"
-    assert _line(slide, "slide of S").get_ydata()[:-1] == pytest.approx(1e3 * result["measure_value"].values[0])
+    assert line(slide, "slide of S").get_ydata()[:-1] == pytest.approx(1e3 * result["measure_value"].values[0])
     levels = {line.get_label(): line.get_ydata()[0] for line in slide.lines if ": " in str(line.get_label())}
     assert levels["far: maximum 165.0\u00a0mm"] == pytest.approx(165.0)
     assert levels["near: minimum 95.00\u00a0mm"] == pytest.approx(95.0)
@@ -121,9 +118,9 @@ def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
 
 def test_a_shaft_that_turns_fully_ends_a_turn_further():
     figure = figure_of(four_bar(72), "motion")
-    crank = _line(figure.axes[0], "crank").get_xydata()
+    crank = line(figure.axes[0], "crank").get_xydata()
     assert crank[-1] - crank[0] == pytest.approx([360.0, 360.0])
-    rocker = _line(figure.axes[0], "rocker").get_xydata()
+    rocker = line(figure.axes[0], "rocker").get_xydata()
     assert rocker[-1] - rocker[0] == pytest.approx([360.0, 0.0])
 
 
@@ -147,10 +144,6 @@ def cycle(press):
     return trunnion.analyse(press, STEPS)
 
 
-def labels(axes) -> list[str]:
-    return axes.get_legend_handles_labels()[1]
-
-
 def test_margin_and_multiples_are_drawn_as_computed(press):
     found = trunnion.locking(press, STEPS)
     upper, lower = figure_of(found, "locking").axes
@@ -161,7 +154,7 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
     alone = found["critical_multiple"].sel(joint="B").values
     shown = np.asarray(lines["B alone"].get_ydata(), float)
     assert shown[np.isfinite(shown)] == pytest.approx(alone[np.isfinite(alone)])
-    assert labels(lower)[0] == "forward"
+    assert lower.get_legend_handles_labels()[1][0] == "forward"
     ahead = np.asarray(lower.lines[1].get_ydata(), float)
     assert ahead == pytest.approx(100 * found["efficiency_instant"].values)
 

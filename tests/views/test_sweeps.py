@@ -11,6 +11,7 @@ import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 import trunnion
+from drawn import texts
 from trunnion import Status, save
 from trunnion.views.shown import figure_of as figure
 from trunnion.views.sweep import arrange, tables
@@ -70,7 +71,7 @@ def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
     assert line[:, 0] == pytest.approx([0, 10, 10, 20, 30])
     assert line[:4, 1] == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3])
     assert np.isnan(line[4, 1])
-    assert [text.get_text() for text in axes.texts] == ["locked"]
+    assert texts(axes) == ["locked"]
 
 
 def test_lines_of_a_map_lie_where_the_field_has_their_number():

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from as_built_models import EXAMPLES
-from matplotlib.axis import Tick
-from matplotlib.text import Text
 from stand_in_tolerances import CASES, LIMIT, toleranced
 
 import trunnion
+from drawn import line, outside, texts
 from trunnion.errors import MechanismError
 from trunnion.results.save import save as export
 from trunnion.studies.tolerance.sampled import QUANTILES
@@ -43,35 +42,6 @@ def case(request):
 def few(result):
     """The names of as many measures as a figure holds."""
     return [str(name) for name in result["measure"].values[:MOST_PANELS]]
-
-
-def outside(drawn):
-    """Texts that lie beyond the edge of a figure."""
-    drawn.canvas.draw()
-    ticks = {id(text) for tick in drawn.findobj(Tick) for text in (tick.label1, tick.label2)}
-    seen = [tick.label1 for axes in drawn.axes for axis in (axes.xaxis, axes.yaxis) for tick in _in_view(axis)]
-    texts = [*(text for text in drawn.findobj(Text) if id(text) not in ticks), *seen]
-    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_visible()]
-    width, height = drawn.bbox.width, drawn.bbox.height
-    return [
-        text
-        for text, box in boxes
-        if text.strip() and (box.x0 < -1 or box.y0 < -1 or box.x1 > width + 1 or box.y1 > height + 1)
-    ]
-
-
-def _in_view(axis):
-    low, high = sorted(axis.get_view_interval())
-    return [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
-
-
-def line(axes, start):
-    """The curve whose label starts so."""
-    return next(one for one in axes.lines if str(one.get_label()).startswith(start)).get_xydata()
-
-
-def labels(axes):
-    return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
 @pytest.mark.sample(9)
@@ -119,7 +89,7 @@ def test_the_histogram_counts_the_samples_within_and_beyond_the_limits():
 def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
     result = toleranced(72)
     (axes,) = figure(result, "envelope").axes
-    rss = line(axes, "RSS")
+    rss = line(axes, "RSS").get_xydata()
     assert rss[:-1, 1] == pytest.approx(np.degrees(result["curve_rss"].values[0]))
     assert rss[-1] == pytest.approx((360.0, rss[0, 1]))
     worst, outer, inner = axes.collections[:3]
@@ -136,17 +106,17 @@ def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
 def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     result = CASES["gap"]()
     (axes,) = figure(result, "envelope").axes
-    drawn = line(axes, "RSS")
+    drawn = line(axes, "RSS").get_xydata()
     missing = np.isnan(result["curve"].values[0])
     assert 0 < missing.sum() < 60
     assert np.isnan(drawn[:72, 1]).tolist() == missing.tolist()
-    assert "cannot be assembled" in [text.get_text() for text in axes.texts]
+    assert "cannot be assembled" in texts(axes)
     result = toleranced(72)
     extra = result.isel(position=[10]).assign_coords(drive=("position", [51.3]))
     extra["curve"] = np.nan * extra["curve"]
     both = xr.concat([result, extra], "position", data_vars="minimal", coords="minimal", compat="override")
     assert both.sizes["position"] == 73
-    assert not np.isnan(line(figure(both, "envelope").axes[0], "RSS")).any()
+    assert not np.isnan(line(figure(both, "envelope").axes[0], "RSS").get_xydata()).any()
 
 
 def test_contributions_are_sorted_and_add_up():
@@ -155,7 +125,7 @@ def test_contributions_are_sorted_and_add_up():
     widths = [patch.get_width() for patch in axes.patches[:4]]
     assert widths == sorted(widths, reverse=True)
     assert sum(widths) == pytest.approx(100)
-    assert line(axes, "RSS², added up")[-1, 0] == pytest.approx(100)
+    assert line(axes, "RSS², added up").get_xydata()[-1, 0] == pytest.approx(100)
     assert axes.get_yticklabels()[0].get_text().endswith("±0.07\u00a0mm")
 
 
@@ -167,8 +137,8 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
     drawn = draw.figure(result, trade_off(result))
     (axes,) = drawn.axes
     assert not outside(drawn)
-    assert line(axes, "stated limits") == pytest.approx(np.array([[100, 16.456705]]), rel=1e-3)
-    assert [text.get_text() for text in axes.texts] == ["infeasible"]
+    assert line(axes, "stated limits").get_xydata() == pytest.approx(np.array([[100, 16.456705]]), rel=1e-3)
+    assert texts(axes) == ["infeasible"]
     assert axes.lines[0].get_drawstyle() == "steps-post"
 
 

@@ -6,6 +6,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 import trunnion
+from drawn import texts
 from mechanisms import MODELS, build, stephenson_six_bar, watt_six_bar
 from trunnion.errors import MechanismError
 from trunnion.views.draw import INK, RULE, save
@@ -15,10 +16,6 @@ from trunnion.views.mode_drawings import ways
 def panels(figure):
     """Title and axes of every drawing."""
     return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_visible()}
-
-
-def texts(axes):
-    return [text.get_text() for text in axes.texts]
 
 
 def test_each_way_is_drawn_under_its_name_and_one_is_marked():

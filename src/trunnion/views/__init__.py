@@ -1,5 +1,4 @@
-"""Results shown: figures (`plots`), one self-contained HTML page (`report`), plain data for a browser (`scene`).
+"""Results shown: a file a result, each with its `tables`, its `figure` as a `Plot`, and its `report` as one HTML page.
 
-Every view takes the Dataset of an analysis and, if wanted, that of the same run without friction. `plots` imports
-matplotlib; import it only where a figure is asked for.
+What is drawn is data (`charts`, `page`); `draw` draws it by matplotlib, which is slow to import and imported only then.
 """

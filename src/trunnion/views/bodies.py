@@ -9,6 +9,7 @@ on a hatched foot. Static figure and browser draw the same list.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
@@ -452,10 +453,6 @@ def _sliding(bodies: Space, name: str) -> list[Solid]:
     return shapes
 
 
-def _ball(bodies: Space, name: str) -> list[Solid]:
-    return [Solid("ball", bodies.joints[name]["links"][1], bodies.seat(name)[None], BALL * bodies.size)]
-
-
 def _cross(bodies: Space, name: str) -> list[Solid]:
     """The two pins of a cross, each along the axis of its link; only the ground has eyes here, others a fork."""
     size, shapes = bodies.size, []
@@ -484,13 +481,12 @@ def _flat(bodies: Space, name: str) -> list[Solid]:
     return [*shapes, _box(links[1 - outer], bodies.seat(name, 1 - outer), slab)]
 
 
-def _cube(bodies: Space, name: str) -> list[Solid]:
-    link = bodies.joints[name]["links"][1]
-    return [_box(link, bodies.seat(name), 0.02 * bodies.size * np.eye(3))]
-
-
-SYMBOLS = {
-    "sleeve": _turning, "rail": _sliding, "ball": _ball, "cross": _cross, "plate": _flat, "cube": _cube,
+SYMBOLS: dict[str, Callable[[Space, str], list[Solid]]] = {
+    "sleeve": _turning, "rail": _sliding, "cross": _cross, "plate": _flat,
+    "ball": lambda bodies, name: [
+        Solid("ball", bodies.joints[name]["links"][1], bodies.seat(name)[None], BALL * bodies.size)],
+    "cube": lambda bodies, name: [
+        _box(bodies.joints[name]["links"][1], bodies.seat(name), 0.02 * bodies.size * np.eye(3))],
 }  # fmt: skip
 
 

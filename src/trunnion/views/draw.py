@@ -449,8 +449,10 @@ class Labels:
             _fill(dark, ends[0], max(LEAST * scale, float(np.hypot(*(ends[1] - ends[0])))), 1.0)
         for k, (note, _) in enumerate(self.waiting):
             note.set_visible(True)
-            extent = _extent(note)
-            half = 0.5 * extent + EMPTY * scale
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "Glyph")
+                box = note.get_window_extent()
+            half = 0.5 * np.array([box.width, box.height]) + EMPTY * scale
             others, best = np.array(spots[:k] + spots[k + 1 :]).reshape(-1, 2), (np.inf, np.zeros(2))
             for far, gap in enumerate(GAPS):
                 for side in SIDES:
@@ -458,19 +460,11 @@ class Labels:
                     low, high = (np.rint(spots[k] + offset + sign * half).astype(int) for sign in (-1, 1))
                     beyond = bool(np.any((low < 0) | (high > edge)))
                     stray = bool(np.any(np.linalg.norm(spots[k] + offset - others, axis=1) < np.hypot(*offset)))
-                    box = dark[max(low[1], 0) : max(high[1], 1), max(low[0], 0) : max(high[0], 1)]
-                    cost = (box.mean() if box.size else 1.0) + FURTHER * far + CUT * beyond + STRAY * stray
+                    covered = dark[max(low[1], 0) : max(high[1], 1), max(low[0], 0) : max(high[0], 1)]
+                    cost = (covered.mean() if covered.size else 1.0) + FURTHER * far + CUT * beyond + STRAY * stray
                     best = min(best, (float(cost), offset), key=lambda pair: pair[0])
             note.set_position(tuple(best[1] / scale))
             _fill(dark, spots[k] + best[1], half, CROSSED)
-
-
-def _extent(note: Annotation) -> Array:
-    """Width and height of a name, pixels."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph")
-        box = note.get_window_extent()
-    return np.array([box.width, box.height])
 
 
 def _fill(dark: Array, middle: Array, half: Array | float, value: float) -> None:

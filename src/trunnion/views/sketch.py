@@ -198,18 +198,13 @@ def _corners(drawing: Picture, link: str, index: int) -> Array | None:
 
 def _plate(axes: Axes, corners: Array, colour: str, width: float, edge: float, order: float) -> None:
     """A rounded plate around points: the same outline drawn wide, then less wide in a tint."""
-    for paint, wide in ((colour, width), (tint(colour), width - edge)):
+    tint = "#" + "".join(f"{round(255 - 0.28 * (255 - int(colour[k : k + 2], 16))):02x}" for k in (1, 3, 5))
+    for paint, wide in ((colour, width), (tint, width - edge)):
         if len(corners) == 2:
             axes.plot(*corners.T, color=paint, linewidth=wide, solid_capstyle="round", zorder=order)
         else:
             axes.add_patch(Polygon(corners, closed=True, facecolor=paint, edgecolor=paint, linewidth=wide,
                                    joinstyle="round", zorder=order))  # fmt: skip
-
-
-def tint(colour: str, share: float = 0.28) -> str:
-    """The colour mixed with white."""
-    rgb = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
-    return "#" + "".join(f"{round(255 - share * (255 - part)):02x}" for part in rgb)
 
 
 def _spring(axes: Axes, drawing: Picture, ends: Sequence[str], index: int, pull: Array | None) -> None:

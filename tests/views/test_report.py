@@ -18,8 +18,9 @@ import trunnion
 from trunnion import play, read, sweep
 from trunnion.views.page import bundle
 from trunnion.views.play import tables as play_tables
+from trunnion.views.readings import readings
 from trunnion.views.report import embedded, report
-from trunnion.views.tolerance import drawable, readings
+from trunnion.views.tolerance import drawable
 from trunnion.views.tolerance import report as tolerance_report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}

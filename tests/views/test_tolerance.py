@@ -19,6 +19,7 @@ from trunnion.studies.tolerance.sampled import QUANTILES
 from trunnion.views import draw
 from trunnion.views.allocation import trade_off
 from trunnion.views.charts import Band, Rule
+from trunnion.views.readings import readings, share_interval
 from trunnion.views.shown import figure_of as figure
 from trunnion.views.tolerance import (
     KINDS,
@@ -28,8 +29,6 @@ from trunnion.views.tolerance import (
     indices,
     inputs,
     overview,
-    readings,
-    share_interval,
     tables,
 )
 

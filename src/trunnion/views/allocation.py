@@ -15,7 +15,7 @@ from trunnion.views import tolerance
 from trunnion.views.axis import names
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe, check_kind
 from trunnion.views.page import NONE, Section, Table
-from trunnion.views.tolerance import is_play, readings, share, share_interval
+from trunnion.views.readings import is_play, readings, share, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr

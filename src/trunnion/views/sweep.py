@@ -32,7 +32,6 @@ from trunnion.views.charts import (
     Chart,
     ColourScale,
     Contours,
-    Legend,
     Line,
     Look,
     Mark,
@@ -128,6 +127,20 @@ def _written(value: float) -> str:
 def thinned(count: int, most: int) -> list[int]:
     """Indices of at most so many of them, evenly, the ends among them."""
     return [int(i) for i in np.unique(np.rint(np.linspace(0, count - 1, min(count, most))))]
+
+
+class Cell(NamedTuple):
+    """What a panel shows, (axis, curve): the numbers, those of the ideal mechanism, why there is none, 0 where there is
+    one, and where contact is lost at some position."""
+
+    values: Array
+    ideal: Array
+    codes: NDArray[np.int8]
+    lost: NDArray[np.bool_]
+
+    def taken(self, rows: Any) -> Cell:
+        """Some of the rows, or cells, in another order."""
+        return Cell(*(part[rows] for part in self))
 
 
 class Arrangement(NamedTuple):
@@ -349,7 +362,7 @@ def figure(
         raise MechanismError(Finding("a map needs two names that vary", "--kind map", remedy))
     unit, values = grid(result, plan, measure)
     ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else np.full(values.shape, np.nan)
-    status, nothing = statuses(result, plan), "∞" if np.isinf(values).any() else "no value"
+    status, causes = statuses(result, plan), {NOTHING: "∞" if np.isinf(values).any() else "no value"} | CAUSES
     values = np.where(np.isfinite(values), values, np.nan)
     usual = usual_peak(ease_of_status(result, status), values, ideal)
     factor, unit_shown = prefixed(usual, unit)
@@ -361,19 +374,18 @@ def figure(
     columns = len(picked) if len(picked) <= 3 else 2 if len(picked) == 4 else 3 if len(picked) <= 9 else 4
     room, bounds = 78 // columns, _bounds(np.append(values, ideal), usual)
     colours = _levels(label, np.append(values, ideal), bounds) if kind == "map" else _colours(plan.other)
-    panels = []
+    lost, panels = (status == Status.CONTACT_LOST) & np.isfinite(values), []
     for place in picked:
-        index: Any = (slice(None), slice(None), *place)
+        cell = Cell(values, ideal, codes, lost).taken((slice(None), slice(None), *place))
         head = fill(plan._replace(fixed=()).title("", place).removeprefix(" at "), room, break_long_words=False)
-        peak = float(np.nanmax(np.abs(values[index]), initial=0.0))
+        peak = float(np.nanmax(np.abs(cell.values), initial=0.0))
         cut = [outside(peak / factor, unit)] if peak > usual * (1 + ALIKE) else []
-        lost = (status[index] == Status.CONTACT_LOST) & np.isfinite(values[index])
-        up = Axis(fill(label, 32 if head else 60, break_long_words=False), bounds)
-        draw = _map if kind == "map" else _curves
-        chart = draw(
-            plan, values[index], ideal[index], codes[index], lost, colours, up, room, {NOTHING: nothing} | CAUSES
-        )
-        panels.append(Panel("", [Chart(chart.x, chart.y, [*chart.marks, *cut], title=head, legend=Legend())]))
+        wide, along = 32 if head else 60, plan.x.axis(room, 0.0 if kind == "map" else 0.015)
+        if kind == "map" and plan.other is not None and colours is not None:
+            up, marks = plan.other.axis(wide, 0.0), _map(plan, cell, causes, colours)
+        else:
+            up, marks = Axis(fill(label, wide, break_long_words=False), bounds), _curves(plan, cell, causes)
+        panels.append(Panel("", [Chart(along, up, [*marks, *cut], title=head)]))
     rows = -(-len(panels) // columns)
     over = f"{plan.x.name} and {plan.other.name}" if kind == "map" and plan.other else plan.x.name
     hidden = f" ({len(picked)} of {len(plan.places)} panels)" if len(picked) < len(plan.places) else ""
@@ -429,13 +441,10 @@ def _lost(x: Array, y: Array, size: float) -> list[Mark]:
     return [Line(x, y, "contact lost at some position", look)] if x.size else []
 
 
-def _curves(
-    plan: Arrangement, values: Array, ideal: Array, codes: NDArray[np.int8], lost: NDArray[np.bool_],
-    colours: ColourScale | None, up: Axis, room: int, causes: Mapping[int, str],
-) -> Chart:  # fmt: skip
+def _curves(plan: Arrangement, cell: Cell, causes: Mapping[int, str]) -> list[Mark]:
     """One curve for each value of the second name; grey where none has an answer, crosses at the ends of gaps."""
-    other, order = plan.other, np.argsort(plan.x.values, kind="stable")
-    x, values, ideal, codes, lost = plan.x.values[order], values[order], ideal[order], codes[order], lost[order]
+    other, order, colours = plan.other, np.argsort(plan.x.values, kind="stable"), _colours(plan.other)
+    x, (values, ideal, codes, lost) = plan.x.values[order], cell.taken(order)
     gone = np.where((codes == 0).any(axis=1), 0, np.where(codes, codes, NOTHING).max(axis=1))
     ends, sides = plan.x.edges(x), np.append(np.flatnonzero(np.diff(gone, prepend=99)), len(gone))
     marks: list[Mark] = [Stripe(ends[start], ends[stop], causes[int(gone[start])])
@@ -456,24 +465,18 @@ def _curves(
             name = None if k else "ideal" if other is None else "ideal, dashed"
             marks.append(Line(x, ideal[:, k], name, Look("ink", 1.0, "long")))
     rows, across = np.nonzero(lost)
-    return Chart(plan.x.axis(room), up, [*marks, *_lost(x[rows], values[rows, across], 6.0)])
+    return [*marks, *_lost(x[rows], values[rows, across], 6.0)]
 
 
-def _map(
-    plan: Arrangement, values: Array, ideal: Array, codes: NDArray[np.int8], lost: NDArray[np.bool_],
-    colours: ColourScale | None, up: Axis, room: int, causes: Mapping[int, str],
-) -> Chart:  # fmt: skip
+def _map(plan: Arrangement, cell: Cell, causes: Mapping[int, str], colours: ColourScale) -> list[Mark]:
     """Bands of the number over two names, hatched where there is none."""
     assert plan.other is not None  # as `figure` sees to
-    assert colours is not None
     (x, across), (y, upward) = (np.unique(scale.values, return_index=True) for scale in (plan.x, plan.other))
-    at = np.ix_(across, upward)
-    values, codes, lost = values[at], codes[at], lost[at]
+    values, _, codes, lost = cell.taken(np.ix_(across, upward))
     gaps = [(causes[code], hatch, codes == code) for code, hatch in HATCHES.items() if np.any(codes == code)]
-    drawn = Contours(x, y, values, plan.x.edges(x, 0.0), plan.other.edges(y, 0.0), colours, gaps)
     rows, columns = np.nonzero(lost)
     rings = _lost(x[rows], y[columns], float(np.clip(160 / max(lost.shape), 1.5, 8)))
-    return Chart(plan.x.axis(room, 0.0), plan.other.axis(32 if plan.facets else 60, 0.0), [drawn, *rings])
+    return [Contours(x, y, values, plan.x.edges(x, 0.0), plan.other.edges(y, 0.0), colours, gaps), *rings]
 
 
 # ---- report -------------------------------------------------------------------------------------------------------

@@ -187,6 +187,9 @@ def test_missing_file_folder_and_huge_file(program: Run, tmp_path: Path) -> None
         (["--method", "magic"], "newton"),
         (["--criterion", "-1"], "criterion"),
         (["--out", "r.ods"], ".csv"),
+        (["--units-row"], "--units-row: has no effect"),
+        (["--units", "model"], "--units: has no effect"),
+        (["--columns", "all"], "--columns: has no effect"),
         (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
     ],
 )

@@ -139,15 +139,15 @@ class Files:
 class Friction:
     """How friction and reactions are settled."""
 
-    friction_method: str = "newton"
+    friction_method: Literal["newton", "successive-approximation"] = "newton"
     criterion: float | None = None
     iterations: int = 200
 
     def checked(self) -> "FrictionMethod":
-        """The method; MechanismError for a name that there is not."""
+        """The method; MechanismError for figures that make no sense."""
         from trunnion.solve.friction_method import FrictionMethod
 
-        return FrictionMethod(self.friction_method, self.criterion, self.iterations)  # type: ignore[arg-type]  # it checks it
+        return FrictionMethod(self.friction_method, self.criterion, self.iterations)
 
 
 # ---- what texts say -----------------------------------------------------------------------------------------------

@@ -38,8 +38,8 @@ def check_files(
     drawn: whether figures can be written; instead: what writes them where they cannot; in_play: whether a joint is.
     """
     others = IMAGES if drawn else ()
-    for key in ("units_row", "columns"):
-        if getattr(files, key) and not files.out:
+    for key, usual in (("units_row", False), ("units", "si"), ("columns", None)):
+        if getattr(files, key) != usual and not files.out:
             raise MechanismError(Finding("has no effect without a file to write", key, "give --out too"))
     for path in files.out or ():
         if instead and path.suffix.lower() in IMAGES:

@@ -34,15 +34,11 @@ _MEANINGS: Mapping[str, tuple[str, str]] = {
 
 
 def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
-    """One finding for each thing that pydantic found, with its path."""
-    return [_finding(entry, model, data) for entry in _errors(error)]
-
-
-def _errors(error: ValidationError) -> list[ErrorDetails]:
-    """pydantic's errors, but for lists that are too short only because some of their items are wrong."""
+    """One finding for each thing that pydantic found, with its path; of a list whose items are wrong only those."""
     entries = error.errors(include_url=False)
     parents = {entry["loc"][:-1] for entry in entries}
-    return [entry for entry in entries if entry["type"] != "too_short" or entry["loc"] not in parents]
+    return [_finding(entry, model, data) for entry in entries
+            if entry["type"] != "too_short" or entry["loc"] not in parents]  # fmt: skip
 
 
 _INSTEAD = {  # what to write in place of a word that is none of the known, by key

@@ -82,7 +82,6 @@ Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
 _FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
-_PLAIN = re.compile(r"[0-9]+(\.[0-9]*)?")
 _CLASSES = re.compile(r"\s*[A-Z]{1,2}[0-9]{1,2}\s*/\s*[a-z]{1,2}[0-9]{1,2}\s*")
 
 
@@ -102,12 +101,10 @@ class Fit:
             return source
         match = _FIT.match(source.strip()) if isinstance(source, str) else None
         if not isinstance(source, str) or not match:
-            classes = isinstance(source, str) and _CLASSES.fullmatch(source)
-            what = "has no diameter" if classes else "is not a fit"
-            remedy = ", or state the radius of the pin too" if classes else ""
-            raise problem(f"{str(source)[:60]!r} {what}", f"write diameter, hole and shaft as 20 mm H7/g6{remedy}")
+            what = "has no diameter" if _CLASSES.fullmatch(str(source)) else "is not a fit"
+            raise problem(f"{str(source)[:60]!r} {what}", "write diameter, hole and shaft as 20 mm H7/g6")
         diameter = match["size"].lstrip("".join(DIAMETER)).strip()
-        plain = bool(_PLAIN.fullmatch(diameter))
+        plain = bool(re.fullmatch(r"[0-9]+(\.[0-9]*)?", diameter))
         if plain or diameter != match["size"]:  # Ø 24 H7/g6
             what = f"'{diameter}' has no unit" if plain else f"'{match['size'][0]}' is not read in '{source[:60]}'"
             raise problem(what, f"write {diameter}{' mm' * plain} {match['hole']}/{match['shaft']}")

@@ -191,9 +191,6 @@ def _circular(mechanism: Fields, measure: Measure) -> bool:
     """Whether an expression depends on itself, directly or through others."""
     reached: list[Measure] = []
     for part in (left := [measure]):  # it grows
-        more = [other for other in operands(mechanism, part).values() if other is not None]
-        if measure in more:
-            return True
-        left += [other for other in more if other not in reached]
-        reached += more
-    return False
+        left += [other for other in operands(mechanism, part).values() if other is not None and other not in reached]
+        reached += left[len(reached) + 1 :]
+    return measure in reached

@@ -194,12 +194,11 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_swept_is_said_with_a_remedy(case: str) -> None:
+def test_what_cannot_be_swept_is_said(case: str) -> None:
     over, word = BAD[case]
     with pytest.raises(MechanismError) as caught:
         trunnion.sweep(read("durango-fourbar"), over, 4)
     assert word in str(caught.value)
-    assert all(finding.remedy for finding in caught.value.findings)
 
 
 def test_what_is_wrong_at_a_point_says_at_which() -> None:

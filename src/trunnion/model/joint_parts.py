@@ -42,31 +42,10 @@ from trunnion.model.rules import NotNegative, NotZero, OnlyWith, Positive, Refer
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
-    "FRICTION_MODELS",
-    "JOINT_TYPES",
-    "PLAY_PAIRS",
-    "TURNING_PAIRS",
-    "BearingStiffness",
-    "Contact",
-    "Fit",
-    "Friction",
-    "Guide",
-    "Joint",
-    "JointDefaults",
-    "LoopJoint",
-    "Losses",
-    "Misalignment",
-    "Pin",
-    "Seat",
-    "clearance",
-    "contact_lacks",
-    "freedoms",
-    "has_guide",
-    "has_pin",
-    "has_play",
-    "motions",
-    "play",
-]
+    "FRICTION_MODELS", "JOINT_TYPES", "PLAY_PAIRS", "TURNING_PAIRS", "BearingStiffness", "Contact", "Fit", "Friction",
+    "Guide", "Joint", "JointDefaults", "LoopJoint", "Losses", "Misalignment", "Pin", "Seat", "clearance",
+    "contact_lacks", "freedoms", "has_guide", "has_pin", "has_play", "motions", "play",
+]  # fmt: skip
 
 JOINT_TYPES = tuple(PAIRS)
 FRICTION_MODELS = ("two-contact", "pezzuti")

@@ -17,13 +17,8 @@ from trunnion.model.quantity import Quantity, term
 from trunnion.model.units import Kind, UnitError, normalise
 
 __all__ = [
-    "DIGITS",
-    "LimitText",
-    "Limits",
-    "half_width",
-    "limits_text",
-    "written",
-]
+    "DIGITS", "LimitText", "Limits", "half_width", "limits_text", "written",
+]  # fmt: skip
 
 _EITHER = re.compile(r"^\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
 _BOTH = re.compile(r"^([-+][0-9.][^/]*|0)/\s*([-+][0-9.].*|0.*)$", re.DOTALL)

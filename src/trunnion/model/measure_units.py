@@ -16,15 +16,9 @@ from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
 __all__ = [
-    "course_kind",
-    "dimension_kinds",
-    "drive_kind",
-    "expression_findings",
-    "figure_kind",
-    "is_place",
-    "operands",
+    "course_kind", "dimension_kinds", "drive_kind", "expression_findings", "figure_kind", "is_place", "operands",
     "place_kind",
-]
+]  # fmt: skip
 
 _COLUMN = re.compile(r"(?P<part>\w+)\.(?P<kind>rotation|slide|effort)|(?P<point>\w+\.\w+)\.(?P<axis>[xyz])")
 

@@ -10,15 +10,8 @@ from difflib import get_close_matches
 from trunnion.errors import Finding, MechanismError
 
 __all__ = [
-    "ERRORS",
-    "FORMULA",
-    "ParameterNames",
-    "as_key",
-    "guarded",
-    "is_number",
-    "nearest",
-    "unguarded",
-]
+    "ERRORS", "FORMULA", "ParameterNames", "as_key", "guarded", "is_number", "nearest", "unguarded",
+]  # fmt: skip
 
 SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width

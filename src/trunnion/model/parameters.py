@@ -33,15 +33,8 @@ from trunnion.model.tolerance_parts import Variation
 from trunnion.model.units import ANY, KINDS, Kind, unit
 
 __all__ = [
-    "LIMITS",
-    "Entry",
-    "Numbers",
-    "ParameterSet",
-    "dimension_errors",
-    "entries",
-    "measured",
-    "walk",
-]
+    "LIMITS", "Entry", "Numbers", "ParameterSet", "dimension_errors", "entries", "measured", "walk",
+]  # fmt: skip
 
 Location = tuple[str | int, ...]
 Rules = tuple[Any, ...]  # of model.rules

@@ -43,22 +43,9 @@ from trunnion.model.rules import InSpace, NotNegative, NotZero, OnlyWith, Positi
 from trunnion.model.units import KINDS
 
 __all__ = [
-    "AT",
-    "FOLDS",
-    "USUAL_PRESSURE_ANGLE",
-    "Driver",
-    "Gear",
-    "Hint",
-    "InertiaTensor",
-    "Initial",
-    "Link",
-    "Load",
-    "Motor",
-    "Point",
-    "PolarPoint",
-    "Spring",
-    "Table",
-]
+    "AT", "FOLDS", "USUAL_PRESSURE_ANGLE", "Driver", "Gear", "Hint", "InertiaTensor", "Initial", "Link", "Load",
+    "Motor", "Point", "PolarPoint", "Spring", "Table",
+]  # fmt: skip
 
 
 class Point(ShortForm):

@@ -19,17 +19,9 @@ from trunnion.model.quantity import AnyQuantity, Dimensionless
 from trunnion.model.rules import NotNegative, Positive, Refers, Selects, Within
 
 __all__ = [
-    "COST_MODELS",
-    "DISTRIBUTIONS",
-    "OPTIONS",
-    "Correlation",
-    "Cost",
-    "CostOption",
-    "Grade",
-    "Process",
-    "Variation",
+    "COST_MODELS", "DISTRIBUTIONS", "OPTIONS", "Correlation", "Cost", "CostOption", "Grade", "Process", "Variation",
     "VariationDefaults",
-]
+]  # fmt: skip
 
 # What each distribution takes beside the limits.
 DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {

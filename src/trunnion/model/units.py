@@ -17,22 +17,9 @@ from typing import Final, Literal
 from trunnion.model.names import nearest
 
 __all__ = [
-    "ANGLE",
-    "ANY",
-    "KINDS",
-    "NUMBER",
-    "Dimension",
-    "Kind",
-    "TableUnits",
-    "UnitError",
-    "dimension_text",
-    "fits",
-    "normalise",
-    "pound_feet",
-    "root",
-    "si_unit",
-    "unit",
-]
+    "ANGLE", "ANY", "KINDS", "NUMBER", "Dimension", "Kind", "TableUnits", "UnitError", "dimension_text", "fits",
+    "normalise", "pound_feet", "root", "si_unit", "unit",
+]  # fmt: skip
 
 Dimension = tuple[Fraction, Fraction, Fraction, Fraction]
 TableUnits = Literal["si", "model"]  # that tables are written in

@@ -14,25 +14,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.checks.joints import joint_findings, joint_values
-from trunnion.model.checks.measures import check_measure, measure_values
-from trunnion.model.checks.parts import (
-    driver_findings,
-    driver_values,
-    expression_name,
-    gear_values,
-    gears,
-    load_findings,
-    loop,
-    motion_dimensions,
-    spring_values,
-    springs,
-    table_values,
-    tables,
-    unknown_name,
-)
-from trunnion.model.checks.tolerances import cost_values, meant, tolerance_names, tolerance_values
-from trunnion.model.checks.units import forgotten_units, plain_angles
+from trunnion.model.checks import joints, measures, parts, tolerances, units
 from trunnion.model.joint_parts import has_pin, motions
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Entry, ParameterSet, dimension_errors
@@ -68,7 +50,7 @@ def _references(mechanism: Varying) -> Iterator[Finding]:
         what = "this is a spatial model: it has a loop, or points with three coordinates"
         yield Finding(what, "space", "state space: spatial")
         return
-    yield from loop(mechanism)
+    yield from parts.loop(mechanism)
     yield from key_findings(mechanism)
     for name in mechanism.drivers:
         yield from Refers("any joint").missing(name, f"drivers.{name}", mechanism)
@@ -79,20 +61,20 @@ def _references(mechanism: Varying) -> Iterator[Finding]:
             yield from Refers("point" if point else "any joint").missing(name, f"assembly.{name}", mechanism)
         yield from InSpace().counted(hint, f"assembly.{name}", mechanism)
     for name, measure in mechanism.measures.items():
-        yield from check_measure(mechanism, measure, f"measures.{name}")
+        yield from measures.check_measure(mechanism, measure, f"measures.{name}")
 
 
 def _together(mechanism: Varying) -> Iterator[Finding]:
     """Whether the parts go together, each by itself and in its place, and the units of every expression."""
     yield from _quantities(mechanism)
     yield from _links(mechanism)
-    yield from joint_findings(mechanism)
-    yield from gears(mechanism)
-    yield from driver_findings(mechanism)
-    yield from load_findings(mechanism)
-    yield from springs(mechanism)
+    yield from joints.joint_findings(mechanism)
+    yield from parts.gears(mechanism)
+    yield from parts.driver_findings(mechanism)
+    yield from parts.load_findings(mechanism)
+    yield from parts.springs(mechanism)
     yield from _hints(mechanism)
-    paths, findings = meant(mechanism, "errors", mechanism.errors)
+    paths, findings = tolerances.meant(mechanism, "errors", mechanism.errors)
     yield from findings
     varying = {entry.path for entry in mechanism.entries if entry.varies}
     for name, path in paths.items():
@@ -103,15 +85,15 @@ def _together(mechanism: Varying) -> Iterator[Finding]:
             (path in varying, "", f"'{path}' varies with the motion and has no one error",
              "state one of a dimension in it"),
         )  # fmt: skip
-    yield from tolerance_names(mechanism)
+    yield from tolerances.tolerance_names(mechanism)
 
 
 def _numbers(mechanism: Varying) -> Iterator[Finding]:
     """What the numbers make impossible or doubtful."""
     yield from check_values(mechanism, mechanism.parameter_set)
-    yield from forgotten_units(mechanism)
-    yield from tolerance_values(mechanism)
-    yield from cost_values(mechanism)
+    yield from units.forgotten_units(mechanism)
+    yield from tolerances.tolerance_values(mechanism)
+    yield from tolerances.cost_values(mechanism)
 
 
 # ---- names and units of expressions ---------------------------------------------------------------------------
@@ -121,8 +103,8 @@ def _quantities(mechanism: Varying) -> Iterator[Finding]:
     """Names and units in every expression; dimensions that nothing uses."""
     dimensions: dict[str, Dimension | None] = {}
     yield from _dimensions(mechanism, dimensions)
-    yield from tables(mechanism, dimensions)
-    moving = {**motion_dimensions(mechanism, dimensions), **dimensions}
+    yield from parts.tables(mechanism, dimensions)
+    moving = {**parts.motion_dimensions(mechanism, dimensions), **dimensions}
     sound: list[tuple[Entry, Mapping[str, Dimension | None]]] = []
     entries = (*mechanism.entries, *mechanism.further_entries)
     for entry in entries:
@@ -131,7 +113,7 @@ def _quantities(mechanism: Varying) -> Iterator[Finding]:
             continue
         missing = [name for name in quantity.names if name not in sayable]
         for name in missing:
-            yield unknown_name(mechanism, name, entry.where, quantity.source, dimensions)
+            yield parts.unknown_name(mechanism, name, entry.where, quantity.source, dimensions)
         if quantity.tolerance and (entry.varies or ends_motion(entry.path)):
             why = "varies with the motion" if entry.varies else "does not vary: the motion is compared there"
             yield Finding(f"'{quantity.source}' has a tolerance, and {why}", entry.where)
@@ -141,7 +123,7 @@ def _quantities(mechanism: Varying) -> Iterator[Finding]:
                 sound.append((entry, sayable))
             except UnitError as error:
                 yield Finding(error.what, entry.where, error.remedy)
-    yield from plain_angles(mechanism, sound)
+    yield from units.plain_angles(mechanism, sound)
     used = {name for entry in entries for name in entry.quantity.names}
     rubs = any(joint.friction is not None for joint in mechanism.effective_joints.values())
     remedy = "remove it" if rubs else "remove it, unless it is of friction, which is off"
@@ -160,7 +142,7 @@ def _dimensions(mechanism: Varying, by_name: dict[str, Dimension | None]) -> Ite
         yield Finding(f"is defined by itself: {ring}", f"dimensions.{circle[0]}", "give one of them a value")
     for name in order:
         where, quantity = f"dimensions.{name}", dimensions[name]
-        yield from expression_name(name, where)
+        yield from parts.expression_name(name, where)
         if set(quantity.names) <= by_name.keys():
             try:
                 by_name[name] = quantity.check(by_name, ANY)
@@ -237,18 +219,18 @@ def check_values(
             if section == "links":
                 yield from _mass(mechanism, mechanism.links[name], values, f"links.{name}")
             elif section == "joints":
-                yield from joint_values(mechanism, name, numbers)
+                yield from joints.joint_values(mechanism, name, numbers)
             elif section == "drivers":
-                yield from driver_values(mechanism, name, values)
+                yield from parts.driver_values(mechanism, name, values)
     yield from _unfollowed(numbers) if changed is None else ()
-    yield from gear_values(mechanism, values)
+    yield from parts.gear_values(mechanism, values)
     if not sections.isdisjoint(("tables", "drivers")):
-        yield from table_values(mechanism, values)
-    yield from spring_values(mechanism, values)
+        yield from parts.table_values(mechanism, values)
+    yield from parts.spring_values(mechanism, values)
     if "links" in sections:
         yield from _sides(mechanism, values)
     if "measures" in sections:
-        yield from measure_values(mechanism, numbers)
+        yield from measures.measure_values(mechanism, numbers)
 
 
 def _alone(numbers: ParameterSet, path: str) -> Iterator[Finding]:

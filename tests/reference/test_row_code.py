@@ -109,8 +109,10 @@ def _coded_as_plain(text, monkeypatch):
 
 def test_one_code_serves_mechanisms_that_differ_by_numbers(monkeypatch):
     monkeypatch.setattr(row_code, "_recorded", {})
-    for length in ("100 mm", "101 mm"):
-        _coded_as_plain(chain(13).replace("c: 100 mm", f"c: {length}"), monkeypatch)
+    texts = (chain(13), chain(13).replace("c: 100 mm", "c: 101 mm"), chain(13).replace("1950 mm, 0]", "1950 mm, 1 mm]"))
+    assert len(set(texts)) == 3  # a length, and a pivot dragged off zero
+    for text in texts:
+        _coded_as_plain(text, monkeypatch)
     assert len(row_code._recorded) == 1
 
 

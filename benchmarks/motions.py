@@ -31,7 +31,7 @@ from benchmarks.side import version
 from trunnion.dynamics.measured import figures_in_time
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
-from trunnion.studies.tolerance.first_order import study
+from trunnion.studies.tolerance.linear import study
 
 DURATION, TOLERANCE = 1.0, 1e-9
 PENETRATION = 7.795222e-5  # m, of the first contact of the pin, by other integrators to all its digits

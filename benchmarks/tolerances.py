@@ -26,7 +26,7 @@ from benchmarks import durango as d
 from benchmarks.run import peak_memory
 from trunnion.model.mechanism import Mechanism
 from trunnion.studies.batch import run
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
+from trunnion.studies.tolerance.linear import ToleranceStudy, study
 from trunnion.studies.tolerance.sampling import Method, Sampling
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -65,7 +65,7 @@ def table(title: str, *columns: str) -> Table:
 
 def workers(console: Console, samples: int) -> None:
     """One and more processes on the same run: angle and torque with friction, 360 positions."""
-    found = study(fourbar(), BOTH, steps=360)
+    found = study(fourbar(), BOTH)
     job = sampling(found, samples)
     shown = table(f"{samples:,} samples × 360 positions, angle and torque with friction", "jobs", "s", "µs/config", "×")
     first = math.nan
@@ -130,7 +130,7 @@ def peer(console: Console) -> None:
         ("Trunnion, path of C", fourbar(friction=False), ("coupler.C.x", "coupler.C.y")),
         ("Trunnion, angle and torque with friction", fourbar(), BOTH),
     ):
-        found = study(mechanism, measures, steps=steps)
+        found = study(mechanism, measures)
         for engine in ("numpy", "compiled"):
             job = found.sampling("monte-carlo", samples, 1, engine)
             sampler = job.prepare()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mechanisms_parts import Data, prismatic, revolute, slide
 from trunnion import Mechanism
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.inputs import inputs_of
+from trunnion.studies.tolerance.linear import ToleranceStudy, study
 from trunnion.studies.tolerance.sampling import Sampler, Sampling
 
 __all__ = [
@@ -206,9 +206,8 @@ def many(mechanism: Mechanism, samples: int = 512, **options: Any) -> tuple[Tole
 def sampler(found: ToleranceStudy, samples: int = 512, method: Any = "monte-carlo", seed: int = 1) -> Sampler:
     """What draws samples of a study, without the first order that a run of it starts with."""
     job = Sampling(
-        found.run.system.mechanism.data(), found.measures, found.steps, method, samples, seed, "numpy", found.friction,
-        len(found.plan.times),
-    )  # fmt: skip
+        found.run.system.mechanism.data(), found.measures, 360, method, samples, seed, "numpy", found.friction, 360
+    )
     return job.prepare()
 
 

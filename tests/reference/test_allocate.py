@@ -227,6 +227,56 @@ def test_measures_keep_their_limits(measure: dict[str, str]) -> None:
     assert 0.2 < float(result["used"][0]) <= 1 + 1e-6
 
 
+def same_figures(results: list[Any]) -> None:
+    """All figures but those of positions are the same to 1e-8."""
+    for result in results[1:]:
+        for name, figure in results[0].items():
+            if "position" not in figure.dims and figure.dtype.kind in "fi" and name not in ("gap", "saving"):
+                size = np.max(np.abs(np.nan_to_num(figure.values)), initial=0.0)
+                np.testing.assert_allclose(result[name].values, figure.values, rtol=0, atol=1e-8 * size, err_msg=name)
+
+
+@pytest.mark.spread(3)
+@pytest.mark.parametrize(
+    "measure",
+    [
+        {"path_error": "coupler.C", "limit": "±0.05 mm"},
+        {"transmission_error": "D", "as": "maximum", "limit": "±0.1 deg"},
+        {"effort": "A", "limit": "±0.04 N m"},
+    ],
+    ids=("path", "lead", "effort"),
+)
+@pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
+def test_no_figure_depends_on_the_steps(measure: dict[str, str], criterion: Any) -> None:
+    model, samples = fourbar(measures={"m": measure}), 400
+    same_figures([trunnion.allocate(model, criterion=criterion, steps=steps, samples=0) for steps in (7, 12, 120, 361)])
+    if criterion == "yield":
+        asked = {"criterion": criterion, "target": 0.9, "samples": samples}
+        same_figures([trunnion.allocate(model, steps=steps, **asked) for steps in (7, 120)])
+    else:
+        methods = ("linear", "worst-case", "monte-carlo" if criterion == "rss" else "quasi-monte-carlo")
+        same_figures([trunnion.tolerance(model, methods=methods, samples=samples, steps=steps) for steps in (7, 120)])
+
+
+def test_a_distance_is_kept_in_every_direction_at_least_cost() -> None:
+    """Σ B/t^0.45 with Σ |u·∂C/∂l| t ≤ 0.05 mm for all unit vectors u at all angles, by SLSQP on a grid of both."""
+    result = trunnion.allocate(fourbar(measures={"m": {"path_error": "coupler.C", "limit": "±0.05 mm"}}), samples=0)
+    assert float(result["cost_total"]) == pytest.approx(21.7296386, rel=1e-6)
+    assert dimensions(result) == pytest.approx([0.02272726, 0.01231861, 0.01622134, 0.01372147], rel=1e-3)
+
+
+def test_an_absurd_price_proves_nothing() -> None:
+    """An option that nobody would take leaves the choice among the others as sharp as it is without it."""
+    data = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data()
+    plain = trunnion.allocate(Mechanism(**data), samples=0)
+    gold = {"gold": {"tolerance": "1 um", "cost": 1e15}}
+    costs = {**data["costs"], "l2": {"options": {**data["costs"]["l2"]["options"], **gold}}}
+    dear = trunnion.allocate(Mechanism(**{**data, "costs": costs}), samples=0)
+    assert float(dear["cost_total"]) == float(plain["cost_total"])
+    assert dear.attrs["proven"] == plain.attrs["proven"] == 1
+    assert float(dear["gap"]) == pytest.approx(float(plain["gap"]), abs=1e-9)
+
+
 def test_run_outs_and_seats_stay_as_they_are() -> None:
     """A run-out that points anywhere has no middle; a pin whose seat is given has no play to choose."""
     data = fourbar().data()

@@ -22,7 +22,7 @@ from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import HOLE
-from trunnion.studies.tolerance.kernel import kernel_of
+from trunnion.studies.tolerance.kernel import CompiledCourses, kernel_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, W = 0.3, 1.0, 2.0  # crank and rod, m; drive speed, rad/s
@@ -292,7 +292,8 @@ def test_both_engines_agree() -> None:
     measures, method = named(mechanism, ["lead", "twice", "ratio"], run.values), FrictionMethod()
     values = mechanism.parameters({"dimensions.ab": np.array([[0.29], [0.3], [0.31]])})
     time = np.broadcast_to(np.linspace(0.0, 1.5, 9), (3, 9))
-    one, other = (kernel_of(engine, run, measures, method).courses(values, time)[0] for engine in ("numpy", "compiled"))
+    kernel = kernel_of(run, measures, method)
+    one, other = (each.courses(values, time)[0] for each in (kernel, CompiledCourses(kernel)))
     for measure in measures:
         assert one[measure.name][0] == pytest.approx(other[measure.name][0], abs=1e-9)
 

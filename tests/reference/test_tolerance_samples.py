@@ -28,7 +28,7 @@ from toleranced import (
 )  # fmt: skip
 from trunnion import Mechanism
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.studies.tolerance.first_order import study
+from trunnion.studies.tolerance.linear import study
 
 Law = Callable[[Array], Array]
 MM = 1e-3

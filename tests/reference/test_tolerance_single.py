@@ -15,6 +15,7 @@ import mechanisms_space
 import trunnion
 from mechanisms_parts import Data
 from toleranced import alone, sampler, varied
+from trunnion.algebra.dual import primal
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.measures.positions import moved
@@ -22,7 +23,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.run import Run, prepare
 from trunnion.statistics.streams import uniforms
-from trunnion.studies.tolerance.first_order import study
+from trunnion.studies.tolerance.linear import study
 
 Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -95,21 +96,22 @@ def measures_of(run: Run) -> list[str]:
 def test_batches_against_mechanisms_of_their_own(name: str) -> None:
     """Every kind of measure and statistic: the same figure of each sample, or none for both."""
     mechanism = varied(CASES[name](), most=6 if CASES[name]().get("space") == "spatial" else 12)
-    found = study(mechanism, measures_of(prepare(mechanism)), STEPS)
+    found = study(mechanism, measures_of(prepare(mechanism)))
     batch = sampler(found)
     u = uniforms(11, 0, batch.inputs.dims, 2)
     part = batch.figures(u)
     figures, status = part["figure"], part["status"]
     values = batch.inputs.values(u)
-    measures = found.measures
-    seen = 0
+    measures, orders, table = found.measures, found.orders, found.table(STEPS)
+    seen, size = 0, float(np.ravel(primal(found.run.system.size(found.run.values)))[0])
     for i in (1,) if mechanism.space == "spatial" else (0, 1):
         run, backs = prepare(alone(mechanism, values, i)), None
-        apart = [one for one in measures if not found.references[one.name].against]
+        apart = [order.measure for order in orders if not order.against]
         exact = figures_of(run, apart, FrictionMethod())
         for k, measure in enumerate(measures):
-            known = found.references[measure.name]
-            scale = max(abs(known.figure), *(np.max(np.abs(part), initial=0.0) for part in known.parts))
+            known = orders[k]
+            scale = max(abs(known.nominal), np.max(np.abs(table.curves[k]), initial=0.0))
+            scale = max(scale, size) if measure.of.against or measure.kind == "path_error" else scale
             if known.against:
                 backs = backs or solved(found.run, run)
                 least, most = deviations(*backs, found.run, measure)
@@ -165,7 +167,7 @@ def test_derivatives_against_samples(name: str) -> None:
     wanted = [one for one in measures_of(prepare(mechanism)) if one.startswith(SMOOTH) and "error" not in one]
     if name == "geared five-bar":  # its point runs on a circle, which has no line
         wanted = [one for one in wanted if not one.startswith("straightness")]
-    found = study(mechanism, wanted, STEPS)
+    found = study(mechanism, wanted)
     batch = sampler(found)
     count = len(found.inputs.tolerances)
     shares = 0.5 + 1e-3 * np.eye(count)  # a number alone, to either side by a thousandth of its limits
@@ -173,9 +175,9 @@ def test_derivatives_against_samples(name: str) -> None:
     moves = np.array([np.ravel(batch.inputs.values(u)[one.path]) - one.nominal for one in found.inputs.tolerances])
     figures = batch.figures(u)["figure"]
     assert np.max(np.abs(moves)) > 0
-    for k, of in enumerate(found.linear.measures):
+    for k, of in enumerate(found.orders):
         for i in range(count):
             width = moves[i, i] - moves[i, count + i]
             slope = (figures[k, i] - figures[k, count + i]) / width
-            size = max(np.abs(of.reference.figure), 1e-3) / abs(found.inputs.tolerances[i].nominal)
+            size = max(np.abs(of.nominal), 1e-3) / abs(found.inputs.tolerances[i].nominal)
             assert of.figure.sensitivity[i] == pytest.approx(slope, rel=1e-4, abs=2e-4 * size), (of.measure.name, i)

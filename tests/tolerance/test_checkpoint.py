@@ -21,7 +21,7 @@ from toy_job import ToyJob, bits
 from trunnion import Mechanism, MechanismError
 from trunnion.studies import batch as module
 from trunnion.studies.batch import Checkpoint, run, settings
-from trunnion.studies.tolerance.first_order import study
+from trunnion.studies.tolerance.linear import study
 
 EXPECTED = bits([ToyJob()(block) for block in range(37)])
 
@@ -194,7 +194,8 @@ def test_stopped_and_resumed(tmp_path: Path) -> None:
 
 def test_seed_and_only_the_seed_changes_samples() -> None:
     """Fewer samples are the first ones; other measures see the same mechanisms."""
-    assert study(fourbar()).sampling("monte-carlo", 16384, 1).block_size == 2048
+    block = study(fourbar()).sampling("monte-carlo", 1, 1).block_size
+    assert 8192 > block > 8192 % block > 0
     found = [
         trunnion.tolerance(fourbar(), names, methods=["monte-carlo"], samples=samples, seed=seed)
         for names, samples, seed in (

@@ -44,9 +44,8 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.space.determinacy import spins_of
 from trunnion.statistics.population import Population
 from trunnion.studies.tolerance.effects import FirstOrder
-from trunnion.studies.tolerance.first_order import ToleranceStudy, stated_or_outputs
 from trunnion.studies.tolerance.inputs import Inputs, plays_of
-from trunnion.studies.tolerance.linear import Of, searched
+from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, stated_or_outputs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,6 +107,7 @@ class Played:
     run: Run
     measures: Sequence[Measure]
     courses: ToleranceStudy
+    table: Table
     figures: ToleranceStudy
     over_cycle: list[JointEffects]
     at_places: list[JointEffects]
@@ -120,16 +120,16 @@ class Played:
     @property
     def status(self) -> NDArray[np.int8]:
         """Of every position."""
-        return self.courses.linear.status
+        return self.table.status
 
     @property
     def time(self) -> Array:
         """Times of the positions, s."""
-        return self.courses.plan.times
+        return self.table.plan.times
 
     def place(self, i: int) -> str:
         """Where in the cycle the place of a measure is, in words."""
-        time = self.figures.linear.measures[i].time
+        time = self.figures.orders[i].time
         near = float(self.time[np.argmin(np.abs(self.time - time))])
         time = near if abs(time - near) <= BESIDE * self.run.cycle.duration else time
         return self.run.system.dial(self.run.values, np.array([time])).at(0)
@@ -182,22 +182,22 @@ def play(
     if run.cycle.duration <= 0:  # there is one position
         courses = [replace(measure, statistic="value") for measure in courses]
     inputs_of_plays = Inputs(run, (), tuple(plays), (), (), Population([], None))
-    over_cycle = figures = ToleranceStudy(run, inputs_of_plays, tuple(courses), steps, FrictionMethod())
+    over_cycle = figures = ToleranceStudy(run, inputs_of_plays, tuple(courses), FrictionMethod())
     if at is not None or run.cycle.duration <= 0:
         measures_chosen = courses
     else:
-        largest = [of.time for of in over_cycle.linear.measures]
+        largest = [order.time for order in over_cycle.orders]
         placed = [
             replace(measure, at=time, timed=True) if measure.rule == "deviation" and np.isfinite(time) else measure
             for measure, time in zip(measures_chosen, largest, strict=True)
         ]
         figures = replace(over_cycle, measures=tuple(placed))
-    linear = over_cycle.linear
-    singular = np.where(linear.status >= Status.SINGULAR, np.nan, 0.0)  # there is no answer
+    table = over_cycle.table(steps)
+    singular = np.where(table.status >= Status.SINGULAR, np.nan, 0.0)  # there is no answer
     played = Played(
-        run, measures_chosen, over_cycle, figures,
-        [_by_joint(of.course, singular + 0.0 * of.curve) for of in linear.measures],
-        [_by_joint(of.figure, np.zeros(())) for of in figures.linear.measures],
+        run, measures_chosen, over_cycle, table, figures,
+        [_by_joint(course, singular + 0.0 * curve) for course, curve in zip(table.courses, table.curves, strict=True)],
+        [_by_joint(of.figure, np.zeros(())) for of in figures.orders],
     )  # fmt: skip
     return _dataset(played, [*_findings(played), *notes])
 
@@ -284,9 +284,9 @@ def _findings(played: Played) -> Iterator[Finding]:
     dial, remedy = run.system.dial(run.values, played.time), "the effect of play is undefined there"
     for i, measure in enumerate(played.measures):
         yield from _of_measure(played, i)
-        yield from _beyond_first_order(played, i, played.figures.linear.measures[i])
+        yield from _beyond_first_order(played, i, played.figures.orders[i])
         lost = np.any(np.isnan(played.over_cycle[i].worst_case), axis=0)
-        lost &= np.isfinite(_nominal(played.courses.linear.measures[i])) & (played.status < Status.SINGULAR)
+        lost &= np.isfinite(played.table.curves[i]) & (played.status < Status.SINGULAR)
         if lost.any():
             at = dial.intervals(np.flatnonzero(lost))
             what = f"a magnitude that is 0 has no derivative {at}"
@@ -326,7 +326,7 @@ def _judged_limit(measure: Measure) -> float | None:
 
 def _of_measure(played: Played, i: int) -> Iterator[Finding]:
     """Whether the worst case of a measure keeps its limit, and joints whose play does nothing to it."""
-    run, measure, course = played.run, played.measures[i], played.courses.linear.measures[i].curve
+    run, measure, course = played.run, played.measures[i], played.table.curves[i]
     limit, worst, unit = _judged_limit(measure), float(np.sum(played.at_places[i].worst_case)), measure.unit(run.system)
     if limit is not None and np.isfinite(worst):
         where, figures = f"measures.{measure.name}.limit", {"worst": worst, "limit": limit, "at": played.place(i)}
@@ -348,7 +348,7 @@ def _of_measure(played: Played, i: int) -> Iterator[Finding]:
         yield Finding.note("play.no_effect", f"measures.{measure.name}", what, **figures)
 
 
-def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
+def _beyond_first_order(played: Played, i: int, of: MeasureOrder) -> Iterator[Finding]:
     """A measure that pins at the rims of their holes change otherwise than first order says, at its place.
 
     One of forces is not looked at where a joint is at rest: there the pins turn the sense of its friction.
@@ -360,7 +360,7 @@ def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
         _, status = study.kernel.courses(study.run.values, np.array([of.time]))
         if np.ravel(status)[0] != Status.SOLVED:
             return
-    least, largest = searched(study.many, study.linear, of)
+    least, largest = study.searched(of)
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
     if off > SLIGHT and least.assembles and largest.assembles:  # else pins cannot get there
@@ -382,7 +382,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     worst, deviation, loads = (np.array(parts) for parts in zip(*played.over_cycle, strict=True))
     places = played.at_places
     arrays: dict[str, Array | NDArray[np.int8]] = {
-        "value": np.array([_nominal(of) for of in played.courses.linear.measures]),
+        "value": np.array(played.table.curves),
         "worst_case": worst,
         "deviation": deviation,
         "worst_case_total": np.sum(worst, axis=1),
@@ -393,7 +393,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "status": played.status,
         "extreme_worst_case": np.array([place.worst_case for place in places]),
         "extreme_deviation": np.array([place.deviation for place in places]),
-        "extreme_time": np.array([of.time for of in played.figures.linear.measures]),
+        "extreme_time": np.array([of.time for of in played.figures.orders]),
     }
     units = [measure.unit(system) for measure in played.measures]
     plain_units, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
@@ -418,12 +418,6 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     }
     variables = described(arrays, VARIABLES, {"measure": plain_units, "sensitivity": per_length})
     return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))
-
-
-def _nominal(of: Of) -> Array:
-    """The course with every pin in the middle, also of a magnitude that is 0, which has no derivative."""
-    plain = of.reference.parts[0]
-    return np.where(np.isnan(of.curve), plain, of.curve) if len(plain) == len(of.curve) else of.curve
 
 
 def _radii(inputs: Inputs, ends: int) -> Array:

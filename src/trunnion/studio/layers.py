@@ -24,7 +24,7 @@ from trunnion.views.scene import scene
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.studies.tolerance.first_order import ToleranceStudy
+    from trunnion.studies.tolerance.linear import ToleranceStudy
 
 __all__ = ["centres_of", "corner_of", "measured", "seats_of", "transmission_of"]
 
@@ -93,7 +93,7 @@ def corner_of(mechanism: Mechanism, name: str, side: str | None, steps: int) -> 
     """
     from trunnion.studies.tolerance.corner import worst_corner  # it takes long to load
 
-    corner = worst_corner(mechanism, name, side, steps)
+    corner = worst_corner(mechanism, name, side)
     run, time = corner.prepared.run, corner.time
     over_cycle = not np.isfinite(time)
     return {

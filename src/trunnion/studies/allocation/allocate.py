@@ -40,8 +40,7 @@ from trunnion.studies.allocation.result import (
 )
 from trunnion.studies.allocation.rows import Rows, rows_of
 from trunnion.studies.allocation.solve import solve, trade_off
-from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.linear import limits
+from trunnion.studies.tolerance.linear import ToleranceStudy
 from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, check_share, tolerance
 
 if TYPE_CHECKING:
@@ -134,7 +133,7 @@ def allocate(
     )  # fmt: skip
     allocated = _allocated(request)
     with_them = mechanism.with_tolerances(allocated.bought) if allocated.answer.found else mechanism
-    names = [of.measure.name for of in allocated.study.linear.measures]
+    names = [measure.name for measure in allocated.study.measures]
     methods: list[Method] = ["linear", "worst-case"] if allocated.answer.found else ["linear"]
     if samples and allocated.answer.found:
         methods.append("monte-carlo")
@@ -331,17 +330,17 @@ def _same(answer: Answer, rows: Rows, ahead: Rows) -> bool:
 def _excess(now: ToleranceStudy) -> dict[str, float]:
     """The worst case that is found on the mechanism, as a share of the limit it is nearest to, by measure."""
     shares = {}
-    for of, (least, most) in zip(now.linear.measures, now.worst(), strict=True):
-        lower, upper = limits(of)
-        shares[of.measure.name] = max(share_of(least.value, lower), share_of(most.value, upper))
+    for order, (least, most) in zip(now.orders, now.worst(), strict=True):
+        lower, upper = order.limits
+        shares[order.measure.name] = max(share_of(least.value, lower), share_of(most.value, upper))
     return shares
 
 
 def _nominal_outside(now: ToleranceStudy) -> list[Finding]:
     """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
     findings = []
-    for of in now.linear.measures:
-        (lower, upper), measure, nominal = limits(of), of.measure, of.reference.figure
+    for order in now.orders:
+        (lower, upper), measure, nominal = order.limits, order.measure, order.nominal
         if lower > 0 or upper < 0:
             word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
             scale = drawn_in(bound, measure.figure_unit(now.run.system, now.run.values))

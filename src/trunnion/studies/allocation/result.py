@@ -20,9 +20,8 @@ from trunnion.results.scales import scales_in
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import Answer, Criterion
-from trunnion.studies.allocation.rows import Rows
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
-from trunnion.studies.tolerance.linear import limits
+from trunnion.studies.allocation.rows import Rows, used_curve
+from trunnion.studies.tolerance.linear import ToleranceStudy, study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,7 +103,7 @@ class AllocationRequest:
     def studied(self, bought: Mapping[str, float]) -> ToleranceStudy:
         """First order of the mechanism with these half widths and clearances, by path."""
         mechanism = self.mechanism.with_tolerances(bought)
-        return study(mechanism, self.measures, self.steps, self.at, self.friction)
+        return study(mechanism, self.measures, self.at, self.friction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,10 +208,11 @@ def _by_measure(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
     count, positions, rows = toleranced.sizes["measure"], toleranced.sizes["position"], allocated.rows
     used, saving, curve = np.full(count, np.nan), np.full(count, np.nan), np.full((count, positions), np.nan)
     if allocated.answer.found:
-        shares, placed = allocated.answer.used, rows.position >= 0
+        shares, table, answer = allocated.answer.used, allocated.study.table(allocated.asked.steps), allocated.answer
         for k in np.unique(rows.measure):
             used[k], saving[k] = np.max(shares[rows.measure == k]), np.sum(allocated.answer.price[rows.measure == k])
-        curve[rows.measure[placed], rows.position[placed]] = shares[placed]
+        for k in range(count):
+            curve[k] = used_curve(allocated.study, table, rows, answer.problem, answer.tolerances, k)
     arrays = {"used": used, "used_curve": curve, "saving": saving}
     if allocated.asked.criterion == "yield":
         arrays["yield_margin"] = np.full(count, np.nan)
@@ -306,10 +306,10 @@ def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]
 def _searched(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
     units = units_along(toleranced["nominal"], "measure")
-    for k, of in enumerate(allocated.study.linear.measures):
+    for k, of in enumerate(allocated.study.orders):
         ends = [float(toleranced[f"searched_{end}"][k]) for end in ("lower", "upper")]
         excess, worst, limit = max(
-            (share_of(value, limit) - 1, value, limit) for value, limit in zip(ends, limits(of), strict=True)
+            (share_of(value, limit) - 1, value, limit) for value, limit in zip(ends, of.limits, strict=True)
         )
         if excess > CLOSE:
             severity = Severity.ERROR if excess > ROUGH else Severity.WARNING if excess > SLIGHT else Severity.NOTE

@@ -1,10 +1,11 @@
-"""The rows of an allocation from first order of a mechanism: every position of every measure with limits.
+"""The rows of an allocation from first order of a mechanism: every place of every measure with limits.
 
-A figure that is a deviation from the nominal mechanism has a row at each position, and at the worst place between them,
-any other figure one row. What moves a row is linear in the half widths, and so is what a play does in its radius, with
-a few exceptions: where a course is worst, which way a point is off most, which two positions a peak-to-peak deviation
-lies between, a distribution whose shape changes with its limits. These are taken as they are with the tolerances of the
-study, and again with those that are found, see `allocate`.
+A figure that is a deviation from the nominal mechanism has a row at many places of its course, which the panels of the
+course choose and no table, and at the worst place between them; any other figure has one row. What moves a row is
+linear in the half widths, and so is what a play does in its radius, with a few exceptions: where a course is worst,
+which way a point is off most, which two places a peak-to-peak deviation lies between, a distribution whose shape
+changes with its limits. These are taken as they are with the tolerances of the study, and again with those that are
+found, see `allocate`.
 """
 
 from __future__ import annotations
@@ -22,10 +23,9 @@ from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 from trunnion.studies.allocation.problem import AllocationProblem, Criterion, RowEffects
 from trunnion.studies.tolerance.effects import FirstOrder
-from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.linear import Of, against, by_position, limits, worst_place
+from trunnion.studies.tolerance.linear import Direction, MeasureOrder, Table, ToleranceStudy, sound
 
-__all__ = ["Rows", "rows_of"]
+__all__ = ["Rows", "rows_of", "used_curve"]
 
 Array = NDArray[np.float64]
 ANY = 1e-6  # half width, SI, at which the shape of a distribution is taken where there is none yet
@@ -35,26 +35,28 @@ TEXTS = ("labels", "places", "units")
 
 @dataclass(frozen=True)
 class Rows:
-    """Effects with what their rows are: measure and position by number, −1 where a figure is of no position of these.
+    """Effects with what their rows are: the measure of each by number.
 
-    moving: rows whose effects depend on the tolerances themselves; unknown: measures of which first order has no row.
+    moving: rows whose effects depend on the tolerances themselves; ends: least and largest deviation that each measure
+    may have, (measure, end); unknown: measures of which first order has no row.
     """
 
     effects: RowEffects
     measure: NDArray[np.intp]
-    position: NDArray[np.intp]
     moving: NDArray[np.bool_]
+    ends: Array
     unknown: tuple[str, ...] = ()
 
     def picked(self, which: NDArray[np.bool_]) -> Rows:
         """Some of the rows."""
         columns: dict[str, Any] = {key: getattr(self.effects, key)[which] for key in NUMBERS}
         columns |= {key: tuple(compress(getattr(self.effects, key), which)) for key in TEXTS}
-        return Rows(replace(self.effects, **columns), self.measure[which], self.position[which], self.moving[which])
+        effects = replace(self.effects, **columns)
+        return replace(self, effects=effects, measure=self.measure[which], moving=self.moving[which])
 
     def with_moving(self, other: Rows) -> Rows:
         """These rows, and those of others that move."""
-        return replace(_joined([self, other.picked(other.moving)]), unknown=self.unknown)
+        return _joined([self, other.picked(other.moving)])
 
 
 def _joined(parts: Sequence[Rows]) -> Rows:
@@ -62,10 +64,8 @@ def _joined(parts: Sequence[Rows]) -> Rows:
     effects = [part.effects for part in parts]
     columns: dict[str, Any] = {key: np.concatenate([getattr(each, key) for each in effects]) for key in NUMBERS}
     columns |= {key: tuple(chain(*(getattr(each, key) for each in effects))) for key in TEXTS}
-    measure, position, moving = (
-        np.concatenate([getattr(part, key) for part in parts]) for key in ("measure", "position", "moving")
-    )
-    return Rows(replace(effects[0], **columns), measure, position, moving)
+    measure, moving = (np.concatenate([getattr(part, key) for part in parts]) for key in ("measure", "moving"))
+    return replace(parts[0], effects=replace(effects[0], **columns), measure=measure, moving=moving)
 
 
 def rows_of(
@@ -76,65 +76,77 @@ def rows_of(
     Effects of these are per unit of half width, of all others those of the whole tolerance (their half width being 1).
     tight: what the limits of a measure are multiplied by.
     """
-    measures = study.linear.measures
-    ends = [tight.get(of.measure.name, 1.0) * np.array(limits(of)) for of in measures]
-    rows = _joined([_of_measure(study, bought, criterion, k, ends[k]) for k in range(len(measures))])
-    limited = [k for k in range(len(measures)) if np.any(np.isfinite(ends[k]))]
-    unknown = tuple(measures[k].measure.name for k in limited if k not in rows.measure)
+    orders, system, values = study.orders, study.run.system, study.run.values
+    ends = np.array([tight.get(order.measure.name, 1.0) * np.array(order.limits) for order in orders])
+    halves = np.array([bought.get(name, 1.0) for name in study.inputs.names])
+    direction: Direction = "worst" if criterion == "worst-case" else "scatter"
+    parts: list[Rows] = []
+
+    def add(k: int, first: FirstOrder, time: Array, moves: bool) -> None:
+        effects = _limited(study, bought, criterion, k, first, ends[k])
+        count, dial = len(time), system.dial(values, np.nan_to_num(time))
+        placed = np.isfinite(time) & (study.run.cycle.duration > 0)
+        effects = replace(
+            effects,
+            labels=(f"measures.{orders[k].measure.name}",) * count,
+            places=tuple(f" at {dial.at(i)}" if placed[i] else "" for i in range(count)),
+            units=(orders[k].measure.figure_unit(system, values),) * count,
+        )
+        finite = np.any(np.isfinite(ends[k])) & np.all(np.isfinite(effects.spread()), axis=1)
+        parts.append(Rows(effects, np.full(count, k), np.full(count, moves), ends).picked(finite))
+
+    for k, order in enumerate(orders):
+        if not _everywhere(order):
+            add(k, order.figure, np.array([order.time if order.placed else np.nan]), order.by_place)
+            continue
+        time, course, status = study.scanned(order.measure, direction)
+        good = sound(status)
+        add(k, FirstOrder(study.effects, course.slope[:, good]), time[good], order.measure.kind == "path_error")
+
+        def used(first: FirstOrder, k: int = k) -> Array:
+            effects = _limited(study, bought, criterion, k, first, ends[k])
+            return AllocationProblem((), effects, criterion).used(halves)
+
+        worst = study.worst_place(order.measure, used, direction)
+        add(k, FirstOrder(study.effects, worst.slope), np.array([worst.time]), True)
+    rows = _joined(parts)
+    limited = [k for k in range(len(orders)) if np.any(np.isfinite(ends[k]))]
+    unknown = tuple(orders[k].measure.name for k in limited if k not in rows.measure)
     correlation = _correlation(study) if criterion == "yield" and study.effects.correlated else None
     return replace(rows, effects=replace(rows.effects, correlation=correlation), unknown=unknown)
 
 
-def _of_measure(study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, k: int, ends: Array) -> Rows:
-    """The rows of one measure, none if it has no limits. ends: of its deviation, (end,).
-
-    A course has a row at every position, and one at the place between them where most of the room is taken: limits are
-    kept over the whole cycle, whatever the steps.
-    """
-    of, system, values = study.linear.measures[k], study.run.system, study.run.values
-    window, limited = of.reference.window, bool(np.any(np.isfinite(ends)))
-    halves = np.array([bought.get(name, 1.0) for name in study.inputs.names])
-    unit = of.measure.figure_unit(system, values)
-    floor = scales_of(study.run).floor(unit)
-
-    def effects_of(first: FirstOrder) -> RowEffects:
-        effects = _effects(study, bought, criterion, first, floor)
-        lower, upper = np.repeat(ends[:, None], len(effects.worst), axis=1)
-        return replace(effects, lower=lower, upper=upper)
-
-    def rows(first: FirstOrder, time: Array, position: NDArray[np.intp], moves: bool) -> Rows:
-        count, several = len(time), len(study.plan.times) > 1 and study.run.cycle.duration > 0
-        dial = system.dial(values, np.append(time, study.plan.times))
-        effects = replace(
-            effects_of(first),
-            labels=(f"measures.{of.measure.name}",) * count,
-            places=tuple(f" at {dial.at(i)}" if several and np.isfinite(time[i]) else "" for i in range(count)),
-            units=(unit,) * count,
-        )
-        finite = limited & np.all(np.isfinite(effects.spread()), axis=1)
-        return Rows(effects, np.full(count, k), position, np.full(count, moves)).picked(finite)
-
-    if not _everywhere(of):
-        time, position = (of.time, window.index[of.place]) if of.place >= 0 else (np.nan, -1)
-        return rows(of.figure, np.array([time]), np.array([position]), by_position(of.reference))
-    course = rows(of.course, window.time, window.index, of.measure.kind == "path_error")
-    if not limited or len(window.time) == 1:
-        return course
-
-    def used(first: FirstOrder) -> Array:
-        return AllocationProblem((), effects_of(first), criterion).used(halves)
-
-    time, slope = worst_place(study.kernel, study.effects.values(), study.effects, of.reference, study.many, used)
-    between = rows(FirstOrder(study.effects, slope), np.array([time]), np.array([-1]), True)
-    return _joined([course, between])
+def used_curve(
+    study: ToleranceStudy, table: Table, rows: Rows, problem: AllocationProblem, tolerances: Array, k: int
+) -> Array:
+    """Share of its limits that a measure uses at each position of a table, by the criterion; NaN outside its window."""
+    order, window = study.orders[k], table.plan.windows[study.measures[k].name]
+    used = np.full(len(table.plan.times), np.nan)
+    if (_everywhere(order) or order.placed) and k in rows.measure:
+        bought = {item.name: t for item, t in zip(problem.contributions, tolerances, strict=True) if not item.fixed}
+        effects = _limited(study, bought, problem.criterion, k, table.courses[k], rows.ends[k])
+        margin = float(problem.margins()[rows.measure == k][0])
+        effects = replace(effects, correlation=problem.effects.correlation)
+        used[window.index] = replace(problem, effects=effects, z=margin, caps=None).used(tolerances)
+    return used
 
 
-def _everywhere(of: Of) -> bool:
-    """Whether a measure has a row at every position."""
-    rule, path_error = of.measure.rule, of.measure.kind == "path_error"
-    # without a derivative, but no further off than the worst position: kept where every position keeps it
-    root = (against(of) and rule == "rms") or (path_error and rule in ("mean", "minimum", "peak-to-peak"))
-    return root or (by_position(of.reference) and of.place >= 0)
+def _everywhere(order: MeasureOrder) -> bool:
+    """Whether a measure has rows all over its course."""
+    rule, path_error = order.measure.rule, order.measure.kind == "path_error"
+    # without a derivative, but no further off than the worst place: kept where every place keeps it
+    root = (order.is_deviation and rule == "rms") or (path_error and rule in ("mean", "minimum", "peak-to-peak"))
+    return root or (order.by_place and order.placed)
+
+
+def _limited(
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, k: int, first: FirstOrder, ends: Array
+) -> RowEffects:
+    """Effects (row, contribution) on a measure, with its limits."""
+    unit = study.orders[k].measure.figure_unit(study.run.system, study.run.values)
+    effects = _effects(study, bought, criterion, first, scales_of(study.run).floor(unit))
+    lower, upper = np.repeat(ends[:, None], len(effects.worst), axis=1)
+    return replace(effects, lower=lower, upper=upper)
 
 
 def _effects(

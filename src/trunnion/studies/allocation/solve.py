@@ -341,7 +341,9 @@ class _Choices:
             for k, each in enumerate(options.values(), part.start):
                 self.table[members, k] = [option.tolerance for option in each]
                 self.prices[members, k] = [option.cost for option in each]
-        self.scale = float(np.sum(np.abs(self.prices))) or 1.0
+        self.offers = self.prices.sum(axis=0)  # of every option to all of its group
+        self.cheapest_offers = np.array([np.min(self.offers[part], initial=np.inf) for part in self.parts])
+        self.base_cost = float(np.sum(self.cheapest_offers)) + sum(cost.numbers()["A"] for _, cost in task.costs)
         self.free = slice(self.count, self.count + len(task.unit))  # the unknowns u
         self.columns = self.free.stop + len(task.costs)
         self.span = np.zeros((len(place), self.columns))
@@ -369,7 +371,7 @@ class _Choices:
                 bound = self.best[0]
                 break
             x, bound = solution
-            if bound >= self.best[0] - PROVEN * self.scale:
+            if self._gap(bound) <= PROVEN:
                 break
             picked, u = x[: self.count] > 0.5, np.clip(x[self.free], self.task.low, self.task.high)
             self._cut_sides(picked, u)
@@ -384,14 +386,29 @@ class _Choices:
             for i in members
         }
         costs = self.prices @ picked + self.problem.costs(t)
-        gap = max(cost - bound, 0.0) / self.scale + (point.gap if point else 0.0)
+        gap = self._gap(bound) + (point.gap if point else 0.0)
         no_price = np.full(len(self.problem.effects.worst), np.nan)
         return optimum(self.problem, t, costs, bound, gap, no_price, choices)
 
+    def _gap(self, bound: float) -> float:
+        """How far the best choice is from a bound, as a share of what it costs beyond the least of any choice."""
+        cost = self.best[0]
+        return max(cost - bound, 0.0) / ((cost - self.base_cost) or 1.0) if np.isfinite(cost) else np.inf
+
     def _linear(self) -> tuple[Array, float] | None:
-        """The linear problem's unknowns and a lower bound of the cost; None if no choice is left."""
+        """The linear problem's unknowns and a lower bound of the cost; None if no choice is left.
+
+        An option that costs more beyond the cheapest of its group than the best choice does in all cannot be part of a
+        better one: it is left out, and no price of it makes the problem coarse.
+        """
         task, inner = self.task, self.columns - self.count
-        aim = np.concatenate([self.prices.sum(axis=0), np.zeros(len(task.unit)), np.ones(len(task.costs))]) / self.scale
+        sizes = [part.stop - part.start for part in self.parts]
+        excess = self.offers - np.repeat(self.cheapest_offers, sizes)
+        allowed = excess <= self.best[0] - self.base_cost
+        scale = float(np.max(excess[allowed], initial=0.0)) or 1.0
+        aim = (
+            np.concatenate([np.where(allowed, excess, 0.0), np.zeros(len(task.unit)), np.ones(len(task.costs))]) / scale
+        )
         once = np.zeros((len(self.parts), self.columns))
         for row, part in zip(once, self.parts, strict=True):
             row[part] = 1.0
@@ -400,13 +417,13 @@ class _Choices:
             rules.append(LinearConstraint(np.array(self.rows), -np.inf, np.array(self.right)))
         costs = np.full(len(task.costs), np.inf)
         low = np.concatenate([np.zeros(self.count), task.low, -costs])
-        high = np.concatenate([np.ones(self.count), task.high, costs])
+        high = np.concatenate([allowed.astype(float), task.high, costs])
         kinds = np.concatenate([np.ones(self.count), np.zeros(inner)])
         answer = milp(aim, integrality=kinds, bounds=Bounds(low, high), constraints=rules, options={"mip_rel_gap": 0.0})
         if answer.x is None:
             return None
         bound = answer.fun if answer.mip_dual_bound is None else min(answer.fun, answer.mip_dual_bound)
-        return np.asarray(answer.x), float(bound) * self.scale
+        return np.asarray(answer.x), float(bound) * scale + float(np.sum(self.cheapest_offers))
 
     def _cut_sides(self, picked: NDArray[np.bool_], u: Array, rows: Rows | None = None) -> None:
         """Add planes of these sides, else of those that a point breaks most: the square of a side without a linear part

@@ -13,8 +13,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_units import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.studies.tolerance.effects import NOBODY, EffectRow
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
-from trunnion.studies.tolerance.linear import Of, searched
+from trunnion.studies.tolerance.linear import MeasureOrder, ToleranceStudy, study
 
 __all__ = ["WorstCorner", "worst_corner"]
 
@@ -41,16 +40,16 @@ class WorstCorner:
 
 
 @np.errstate(all="ignore")
-def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> WorstCorner:
+def worst_corner(mechanism: Mechanism, name: str, side: str | None) -> WorstCorner:
     """Return the corner at which a measure is "least" or "largest", or whichever of both is farther from nominal.
 
     Pins that loads would press to one side may lie anywhere in their holes, as in `tolerance --seat free`.
     """
     if "loaded" in mechanism.seated.values():
         mechanism = mechanism.with_seats("free")
-    prepared = study(mechanism, [name], steps)
-    run, (of,), effects = prepared.run, prepared.linear.measures, prepared.effects
-    ends = searched(prepared.many, prepared.linear, of)
+    prepared = study(mechanism, [name])
+    run, (of,), effects = prepared.run, prepared.orders, prepared.effects
+    ends = prepared.searched(of)
     least, largest = (corner.value for corner in ends)
     if not np.isfinite([least, largest]).all():
         raise MechanismError(Finding("has no worst corner: the figure is undefined", f"measures.{name}"))
@@ -68,18 +67,20 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) 
     return WorstCorner(prepared, (least, largest), unit, side_index, time, numbers, rows)
 
 
-def _place(prepared: ToleranceStudy, of: Of, values_there: Mapping[str, Number], sign: int) -> float:
+def _place(prepared: ToleranceStudy, order: MeasureOrder, values_there: Mapping[str, Number], sign: int) -> float:
     """Time, s, at which a figure stands at its corner; NaN of one of the whole cycle."""
-    time = of.time
-    if of.measure.rule == "deviation" and len(of.reference.parts) == 1:
-        at = of.reference.window.time
-        for _ in range(ROUNDS):
-            courses = (prepared.kernel.courses(numbers, at)[0] for numbers in (values_there, prepared.inputs.nominal))
-            moved, nominal = (np.ravel(primal(course[of.measure.name][0])) for course in courses)
-            change = np.broadcast_to(moved - nominal, at.shape)
-            if of.reference.turning:
-                change = change - 2 * np.pi * np.round(change / (2 * np.pi))
-            top = int(np.nanargmax(sign * change))
-            time, last = float(at[top]), len(at) - 1
-            at = np.linspace(at[max(top - 1, 0)], at[min(top + 1, last)], AROUND if last else 1)
+    measure, kernel = order.measure, prepared.kernel
+    time, at = order.time, prepared.many.spots(measure)
+    for _ in range(ROUNDS if measure.rule == "deviation" else 0):
+        parts, nominal = (
+            kernel.courses(numbers, at)[0][measure.name] for numbers in (values_there, prepared.inputs.nominal)
+        )
+        if len(parts) > 1:
+            break
+        change = np.broadcast_to(np.ravel(primal(parts[0])) - np.ravel(primal(nominal[0])), at.shape)
+        if measure.turning(prepared.run.system):
+            change = change - 2 * np.pi * np.round(change / (2 * np.pi))
+        top, last = int(np.nanargmax(sign * change)), len(at) - 1
+        time = float(at[top])
+        at = np.linspace(at[max(top - 1, 0)], at[min(top + 1, last)], AROUND if last else 1)
     return time

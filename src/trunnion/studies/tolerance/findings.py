@@ -25,12 +25,12 @@ from trunnion.model.parameters import measured
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.results.scales import extreme_place
-from trunnion.studies.tolerance.linear import by_position, limited, limits
+from trunnion.studies.tolerance.linear import limited
 from trunnion.studies.tolerance.sampled import CAUSES
 
 if TYPE_CHECKING:
-    from trunnion.studies.tolerance.first_order import Outcome
-    from trunnion.studies.tolerance.linear import Of
+    from trunnion.studies.tolerance.linear import MeasureOrder
+    from trunnion.studies.tolerance.result import Outcome
 
 __all__ = ["findings_of", "summary"]
 
@@ -46,13 +46,13 @@ def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dia
     """Of each measure: nominal figure, worst case, RSS, scatter, yield, and what contributes most."""
     run = outcome.study.run
     alone = ", without correlation" if outcome.study.effects.correlated else ""
-    for i, (of, unit) in enumerate(zip(outcome.study.linear.measures, units, strict=True)):
+    for i, (of, unit) in enumerate(zip(outcome.study.orders, units, strict=True)):
         name, deviates = of.measure.name, of.measure.rule == "deviation"
         if not deviates:
-            yield Figure(f"{name}.nominal", f"{name}, nominal", of.reference.figure, unit)
+            yield Figure(f"{name}.nominal", f"{name}, nominal", of.nominal, unit)
         at = ""
-        if of.place >= 0 and run.cycle.duration > 0:
-            course = np.asarray(of.course.spread.half if deviates else of.curve, float)
+        if of.placed and run.cycle.duration > 0:
+            course = np.asarray(outcome.table.courses[i].spread.half if deviates else outcome.table.curves[i], float)
             at = f"at {run.system.dial(run.values, np.array([of.time])).at(0)}"
             at = extreme_place(course, at, scales_of(run).floor(unit))
         lower, upper, rss, _, deviation = map(float, of.total)
@@ -77,7 +77,7 @@ def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dia
         yield Figure("samples_failed", "samples not solved", np.sum(sampled["failed"]))
 
 
-def _contributions(outcome: Outcome, of: Of) -> Iterator[Figure]:
+def _contributions(outcome: Outcome, of: MeasureOrder) -> Iterator[Figure]:
     """The number that contributes most, by RSS and, of correlated numbers, by variance."""
     name, deviation, halves = of.measure.name, float(of.total.deviation), np.nan_to_num(of.figure.spread.half) ** 2
     shares = {"rss": (halves / np.sum(halves), "share of RSS²")} if np.sum(halves) > 0 else {}
@@ -93,7 +93,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     """Limits that are missed, and what is doubtful, beside what the model itself has to say."""
     study = outcome.study
     target, fine = outcome.target, True
-    for i, of in enumerate(study.linear.measures):
+    for i, of in enumerate(study.orders):
         if limited(of.measure) and (missed := _missed(outcome, sampled, i, of)) is not None:
             fine = False
             yield missed
@@ -108,7 +108,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     yield from shared_dimensions(study.run.system.mechanism)
     yield from _of_tolerances(outcome)
     yield from _nominal(outcome)
-    for i, of in enumerate(study.linear.measures):
+    for i, of in enumerate(study.orders):
         yield from _first_order(outcome, sampled, i, of)
     if sampled is not None:
         done = int(sampled["samples"])
@@ -128,7 +128,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
 # ---- limits that are missed -----------------------------------------------------------------------------------
 
 
-def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Finding | None:
+def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: MeasureOrder) -> Finding | None:
     """An error for a measure whose worst case, yield or capability is outside its limits, with what helps."""
     study, measure, target = outcome.study, of.measure, outcome.target
     low, high, slight = np.nan, np.nan, CLOSE
@@ -136,11 +136,11 @@ def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Findin
         low, high = float(of.total.lower), float(of.total.upper)
     if outcome.worst is not None and all(np.isfinite(corner.value) for corner in outcome.worst[i]):
         (low, high), slight = (corner.value for corner in outcome.worst[i]), SLIGHT
-    lower, upper = limits(of)
+    lower, upper = of.limits
     size = max([abs(end) for end in (lower, upper) if np.isfinite(end)], default=0.0)
     outside = low < lower - slight * size or high > upper + slight * size
 
-    nominal, unit = of.reference.figure, measure.figure_unit(study.run.system, study.run.values)
+    nominal, unit = of.nominal, measure.figure_unit(study.run.system, study.run.values)
     sizes = [end for end in (measure.lower, measure.upper) if end is not None] + [float(part) for part in of.total[:3]]
     factor, unit = scale_of(nominal if np.isfinite(nominal) else 0.0, sizes, unit)
     parts, figures = [], {"worst_lower": low, "worst_upper": high}
@@ -174,9 +174,9 @@ def _yield(sampled: Sampled, name: str, i: int | tuple[()] = ()) -> str:
     return f"yield {middle} % (95 % interval {ends[0]} to {ends[1]} %)"
 
 
-def _remedy(outcome: Outcome, of: Of) -> str:
+def _remedy(outcome: Outcome, of: MeasureOrder) -> str:
     """What brings a measure within its limits: another nominal mechanism, or narrower tolerances."""
-    lower, upper = limits(of)
+    lower, upper = of.limits
     # the variance decides a yield, and the worst case knows no correlation
     of_what = "worst case" if outcome.target is None else "variance"
     parts = np.nan_to_num(of.figure.spread.worst if outcome.target is None else of.figure.covariances)
@@ -227,29 +227,27 @@ def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
 def _nominal(outcome: Outcome) -> Iterator[Finding]:
     """Positions at which the nominal mechanism has no answer, or none to rely on; figures that it has not."""
     study = outcome.study
-    dial = study.run.system.dial(study.run.values, study.plan.times)
+    dial = study.run.system.dial(study.run.values, outcome.table.plan.times)
     for code in Status:
-        places = np.flatnonzero(study.linear.status == code)
+        places = np.flatnonzero(outcome.table.status == code)
         if len(places) and (code >= Status.NOT_CONVERGED or code == Status.NEAR_SINGULAR):
             severity = Severity.ERROR if code >= Status.NOT_CONVERGED else Severity.WARNING
             at, remedy = dial.intervals(places), "the first-order result there is none to rely on: use the samples"
             what = f"nominal mechanism: {code.text} {at}"
             yield Finding.weighed(severity, "tolerance.nominal_no_answer", "", what, remedy, at=at)
-    for of in study.linear.measures:
-        if np.isnan(of.reference.figure):
+    for of in study.orders:
+        if np.isnan(of.nominal):
             what, remedy = f"{of.measure.name}: undefined for the nominal mechanism", "take it where it is defined"
             if of.measure.in_time:
                 what, remedy = f"{what}: {not_steady(study.run, of.measure)}", LONGER
             yield Finding.error("tolerance.nominal_no_figure", f"measures.{of.measure.name}", what, remedy)
 
 
-def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Iterator[Finding]:
+def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: MeasureOrder) -> Iterator[Finding]:
     """A measure of which first order knows nothing, or whose worst case or scatter is another on the mechanism."""
     study, where, remedy = outcome.study, f"measures.{of.measure.name}", "use the samples"
     lower, upper = float(of.total.lower), float(of.total.upper)
-    index = study.plan.windows[of.measure.name].index
-    rests = of.place >= 0 and study.linear.status[index[of.place]] == Status.ZERO_SLIP
-    if rests and not of.measure.of_motion:
+    if of.rests and not of.measure.of_motion:
         what = "a joint is momentarily at rest there: friction jumps, and the first-order result is one-sided"
         yield Finding.warning("first_order.one_sided", where, what, remedy)
     if not np.isfinite(upper):
@@ -267,7 +265,7 @@ def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> I
             times = "∞" if np.isinf(ratio) else f"{ratio:.2f}"
             what = f"the worst case found by search is {times} times the first-order one"
             yield Finding.note("first_order.worst_case_differs", where, what, "use the searched one", ratio=ratio)
-    if sampled is not None and int(sampled["samples"]) >= ENOUGH and not by_position(of.reference):
+    if sampled is not None and int(sampled["samples"]) >= ENOUGH and not of.by_place:
         drawn, linear = float(sampled["deviation"][i]), float(of.total.deviation)
         if max(drawn, linear) > OTHERWISE * min(drawn, linear):  # not of NaN
             unit = of.measure.figure_unit(study.run.system, study.run.values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -36,11 +36,11 @@ from trunnion.solve.walk_kernel import WalkKernel
 from trunnion.statistics.streams import uniforms
 from trunnion.studies.tolerance.inputs import Inputs
 
-__all__ = ["batch_of", "engine_for", "kernel_of", "many_of"]
+__all__ = ["engine_for", "kernel_of", "many_of"]
 
-AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20}  # numbers in an array, by engine
+AT_ONCE = 1 << 20  # numbers in an array of the compiled engine
 PILOTS = 24  # samples that tell how finely the courses of all have to be resolved
-MOST_RUNS = 64  # mechanisms whose seats are kept
+MOST_RUNS = 512  # mechanisms whose seats are kept
 WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
 
 
@@ -49,25 +49,23 @@ class LoadedKernel(MotionKernel):
     """Mechanisms whose pins lie where their loads press them: each by itself, as `analyse` has it.
 
     Where a pin crosses its hole is another place in each, so that no panels serve all. Derivatives are central
-    differences.
+    differences. runs: the last mechanisms by their numbers, which keep the seats that were found.
     """
 
-    @cached_property
-    def _runs(self) -> dict[bytes, Run]:
-        return {}
+    runs: dict[bytes, Run] = field(default_factory=dict, compare=False, repr=False)
 
     def _run(self, values: Mapping[str, Number], lane: int) -> Run:
-        """One of the mechanisms, over its own cycle; the last few are kept with their seats."""
+        """One of the mechanisms, over its own cycle."""
         numbers = {path: np.ravel(np.asarray(primal(number), float)) for path, number in values.items()}
         numbers_of_lane = {path: float(number[lane if len(number) > 1 else 0]) for path, number in numbers.items()}
         key = np.array(list(numbers_of_lane.values())).tobytes()
-        if key not in self._runs:
-            while len(self._runs) >= MOST_RUNS:
-                self._runs.pop(next(iter(self._runs)))
+        if key not in self.runs:
+            while len(self.runs) >= MOST_RUNS:
+                self.runs.pop(next(iter(self.runs)))
             end = moved(self.run, numbers_of_lane, np.array([self.run.cycle.duration]))
             cycle = replace(self.run.cycle, duration=float(np.ravel(primal(end))[0]))
-            self._runs[key] = replace(self.run, values=numbers_of_lane, cycle=cycle)
-        return self._runs[key]
+            self.runs[key] = replace(self.run, values=numbers_of_lane, cycle=cycle)
+        return self.runs[key]
 
     def breaks(self, values: Mapping[str, Number]) -> list[NDArray[np.float64]]:
         """Times, s, of each mechanism at which its seats or its forces may bend or jump."""
@@ -123,7 +121,7 @@ class CompiledCourses:
     @property
     def at_once(self) -> int:
         """Places that it takes best at a time."""
-        return AT_ONCE["compiled"]
+        return AT_ONCE
 
     def breaks(self, values: Mapping[str, Number]) -> None:
         """None: they follow from those of the nominal mechanism."""
@@ -168,51 +166,42 @@ class CompiledCourses:
         }, status
 
 
-def engine_for(engine: Engine, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> Engine:
-    """The engine by its name; of auto the compiled one where it pays and can take the mechanism."""
-    if engine != "auto":
-        return engine
-    if isinstance(numpy, LoadedKernel):
-        return "numpy"
-    if configurations < WORTH_COMPILING or any(measure.in_time for measure in numpy.measures):
+def kernel_of(run: Run, measures: Sequence[Measure], friction: FrictionMethod, loaded: bool = False) -> NumpyKernel:
+    """The kernel in NumPy. loaded: pins lie where their loads press them."""
+    return (LoadedKernel if loaded else MotionKernel)(run, measures, friction)
+
+
+def engine_for(engine: Engine, kernel: NumpyKernel, values: Mapping[str, Number], configurations: int) -> Engine:
+    """The engine by its name; of auto the compiled one where it pays and can take the mechanism.
+
+    Raises MechanismError if the compiled one is asked for and cannot.
+    """
+    timed = next((measure.name for measure in kernel.measures if measure.in_time), None)
+    if engine == "numpy" or (engine == "auto" and configurations < WORTH_COMPILING):
         return "numpy"
     try:
-        CompiledCourses(numpy).check(values)
+        if isinstance(kernel, LoadedKernel):
+            raise MechanismError(Finding("the compiled engine has no pins seated by their loads", "engine"))
+        if timed is not None:
+            what = f"the measure '{timed}' is of a motion in time, which the compiled engine does not have"
+            raise MechanismError(Finding(what, "engine", "use numpy, or auto"))
+        if engine == "auto":
+            CompiledCourses(kernel).check(values)
     except MechanismError:
+        if engine != "auto":
+            raise
         return "numpy"
     return "compiled"
 
 
-def batch_of(engine: str, positions: int) -> int:
-    """Samples that an engine takes best at a time: of NumPy in arrays that stay in cache."""
-    return max(1, AT_ONCE[engine] // positions)
-
-
-def kernel_of(
-    engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod, loaded: bool = False
-) -> Kernel:
-    """The kernel of an engine by its name. loaded: pins lie where loads press them. MechanismError if it cannot."""
-    numpy = (LoadedKernel if loaded else MotionKernel)(run, measures, friction)
-    if engine == "numpy":
-        return numpy
-    if loaded:
-        raise MechanismError(
-            Finding("the compiled engine has no pins seated by their loads", "engine", "use numpy, or auto")
-        )
-    timed = next((measure.name for measure in measures if measure.in_time), None)
-    if timed is not None:
-        what = f"the measure '{timed}' is of a motion in time"
-        raise MechanismError(Finding(what, "engine", "use numpy, which has motions in time, or auto"))
-    return CompiledCourses(numpy)
-
-
-def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: FrictionMethod, engine: str) -> Many:
+def many_of(kernel: NumpyKernel, inputs: Inputs, engine: str = "numpy") -> Many:
     """The measures of the nominal mechanism, pins in the middle of their holes where they have no seat."""
 
     def kernels(part: Sequence[Measure]) -> Kernel:
-        return kernel_of(engine, run, part, friction, bool(inputs.pressed))
+        numpy = replace(kernel, measures=part)
+        return CompiledCourses(numpy) if engine == "compiled" else numpy
 
-    many = Many(run, measures, inputs.nominal, kernels)
+    many = Many(kernel.run, kernel.measures, inputs.nominal, kernels)
     if not inputs.pressed:
         many.tune(inputs.values(uniforms(0, 0, inputs.dims, PILOTS)))
     return many

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +21,16 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 from trunnion.solve.system import System
 from trunnion.studies.tolerance.effects import Spread
 from trunnion.studies.tolerance.findings import findings_of, summary
-from trunnion.studies.tolerance.first_order import Outcome, ToleranceStudy
+from trunnion.studies.tolerance.indices import Indices
+from trunnion.studies.tolerance.linear import Table, ToleranceStudy
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
+from trunnion.studies.tolerance.sampling import Samples
+from trunnion.studies.tolerance.search import Corner
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
+__all__ = ["VARIABLES", "Outcome", "course_text", "dataset", "text_of"]
 
 Array = NDArray[np.float64]
 # units: "measure": that of each figure; "curve": of each course; "parameter": of each parameter; "ratio" and "curve
@@ -117,21 +122,39 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
+
+    study: ToleranceStudy
+    steps: int
+    methods: tuple[str, ...]
+    worst: Sequence[tuple[Corner, Corner]] | None = None
+    samples: Samples | None = None
+    indices: Indices | None = None
+    target: float | None = None
+
+    @cached_property
+    def table(self) -> Table:
+        """The courses at the positions of the result."""
+        return self.study.table(self.steps)
+
+
 def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     """The numbers of all methods with all that is said of them."""
-    study = outcome.study
+    study, table = outcome.study, outcome.table
     system, mechanism = study.run.system, study.run.system.mechanism
-    counted = sampled(outcome.samples, study) if outcome.samples else None
+    counted = sampled(outcome.samples, study, table) if outcome.samples else None
     job = outcome.samples.job if outcome.samples else None
     findings = [*findings_of(outcome, counted), *notes]
-    arrays = {**_linear(study), **_worst(outcome), **(counted or {})}
+    arrays = {**_linear(study, table), **_worst(outcome), **(counted or {})}
     arrays |= outcome.indices.arrays if outcome.indices else {}
     units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
     curve_units = [measure.unit(system) for measure in study.measures]
     dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
     kinds = {**mechanism.parameter_kinds(), **dimensions}
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in study.inputs.names]
-    dial = system.dial(study.run.values, study.plan.times)
+    dial = system.dial(study.run.values, table.plan.times)
     variables = described(arrays, VARIABLES, _units(units, curve_units, parameter_units, dial.unit))
     used = {dim for each in variables.values() for dim in each.dims}
     labels = {
@@ -164,11 +187,11 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(study.run.cycle.periodic),
-        "steps": study.steps,
+        "steps": outcome.steps,
         **scales_of(study.run).summary(summary(outcome, counted, units, dial)),
         "findings": finding_rows(findings),
     }
-    return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(study.plan.times, *dial)})
+    return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(table.plan.times, *dial)})
 
 
 def _units(
@@ -188,17 +211,9 @@ def _units(
     }  # fmt: skip
 
 
-def _linear(study: ToleranceStudy) -> dict[str, Any]:
+def _linear(study: ToleranceStudy, table: Table) -> dict[str, Any]:
     """What first order says."""
-    rows, run = study.linear.measures, study.run
-
-    def over_positions(arrays: Sequence[Array]) -> Array:
-        """Numbers over the windows of measures as one array over all positions, NaN outside."""
-        spread = np.full((len(arrays), *arrays[0].shape[:-1], len(study.plan.times)), np.nan)
-        for row, array, of in zip(spread, arrays, rows, strict=True):
-            row[..., of.reference.window.index] = array
-        return spread
-
+    rows, run = study.orders, study.run
     # drive coordinates at which figures are taken; NaN of those of no single position
     placed = [np.isfinite(of.time) and run.cycle.duration > 0 for of in rows]
     times = np.array([of.time % run.cycle.duration if run.cycle.periodic else of.time for of in rows])
@@ -210,7 +225,7 @@ def _linear(study: ToleranceStudy) -> dict[str, Any]:
         shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
         variance = scatter / np.sum(scatter, axis=1, keepdims=True)
     return {
-        "nominal": np.array([of.reference.figure for of in rows]),
+        "nominal": np.array([of.nominal for of in rows]),
         "place": np.array(places, float),
         **{f"parameter_{key}": array for key, array in study.effects.numbers().items()},
         "sensitivity": np.array([of.figure.sensitivity for of in rows]),
@@ -219,11 +234,11 @@ def _linear(study: ToleranceStudy) -> dict[str, Any]:
         "contribution_variance": variance,
         "worst_case_lower": total.lower, "worst_case_upper": total.upper, "rss": total.half,
         "shift_linear": total.shift, "deviation_linear": total.deviation,
-        "curve": over_positions([of.curve for of in rows]),
-        "curve_sensitivity": over_positions([of.course.sensitivity for of in rows]),
-        **{f"curve_{name}": over_positions([getattr(of.course.total, part) for of in rows])
+        "curve": table.spread(table.curves),
+        "curve_sensitivity": table.spread([course.sensitivity for course in table.courses]),
+        **{f"curve_{name}": table.spread([getattr(course.total, part) for course in table.courses])
            for name, part in CURVES.items()},
-        "status": study.linear.status,
+        "status": table.status,
     }  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from trunnion.errors import Status
 from trunnion.measures.measures import Measure
 from trunnion.statistics import intervals
 from trunnion.statistics.moments import Moments, moments_of
-from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.linear import Table, ToleranceStudy
 from trunnion.studies.tolerance.sampling import Samples
 
 __all__ = ["CAUSES", "QUANTILES", "limits_of", "sampled"]
@@ -31,7 +31,7 @@ LEAST = 1e-9, 1e-12  # width of the bins of a figure that does not scatter: of t
 SIZES = 12  # at which it is shown how figures converge
 
 
-def sampled(samples: Samples, study: ToleranceStudy) -> dict[str, Any]:
+def sampled(samples: Samples, study: ToleranceStudy, table: Table) -> dict[str, Any]:
     """All figures of the samples: arrays by the names of `result.VARIABLES`."""
     job, figure, passed = samples.job, samples.figure, samples.passed
     count, done = figure.shape
@@ -74,7 +74,7 @@ def sampled(samples: Samples, study: ToleranceStudy) -> dict[str, Any]:
         "yield_all_low": ends["yield"][0][-1],
         "yield_all_high": ends["yield"][1][-1],
         **_capability(job.measures, study, moments),
-        "band": _bands(samples, study),
+        "band": _bands(samples, study, table),
         **_convergence(samples),
     }
     for name, (low, high) in ends.items():
@@ -148,7 +148,7 @@ def _capability(measures: tuple[Measure, ...], study: ToleranceStudy, moments: M
     """C_p and C_pk of the figure between its limits; of a largest |deviation|, towards the limits' smaller side."""
     cp, cpk = np.full(len(measures), np.nan), np.full(len(measures), np.nan)
     for i, measure in enumerate(measures):
-        low, high = limits_of(measure, study.references[measure.name].figure)
+        low, high = limits_of(measure, study.orders[i].nominal)
         if np.isfinite(low) or np.isfinite(high):
             cp[i], cpk[i] = intervals.capability(low, high, moments.mean[i], moments.deviation[i])
     return {"cp": cp, "cpk": cpk}
@@ -169,13 +169,12 @@ def limits_of(measure: Measure, nominal: float) -> tuple[float, float]:
     return low, high
 
 
-def _bands(samples: Samples, study: ToleranceStudy) -> Array:
+def _bands(samples: Samples, study: ToleranceStudy, table: Table) -> Array:
     """Quantiles of the deviation of the course at every position, of the samples whose curves are kept."""
-    bands = np.full((len(samples.curves), len(QUANTILES), samples.job.positions), np.nan)
-    for i, (curves, of) in enumerate(zip(samples.curves, study.linear.measures, strict=True)):
-        nominal = 0.0 if of.reference.against else np.nan_to_num(of.curve)
-        ordered = np.sort(curves - nominal, axis=0)  # NaN last
-        index = study.plan.windows[of.measure.name].index
+    bands = np.full((len(samples.curves), len(QUANTILES), len(table.plan.times)), np.nan)
+    for i, (curves, order) in enumerate(zip(samples.curves, study.orders, strict=True)):
+        ordered = np.sort(curves - (0.0 if order.against else np.nan_to_num(table.curves[i])), axis=0)  # NaN last
+        index = table.plan.windows[order.measure.name].index
         for position, column in zip(index, ordered.T, strict=True):
             bands[i, :, position] = _quantiles(column[~np.isnan(column)], np.array(QUANTILES))
     return bands

@@ -24,7 +24,7 @@ from trunnion.solve.run import prepare
 from trunnion.statistics.streams import SobolStream, uniforms
 from trunnion.studies.batch import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import batch_of, many_of
+from trunnion.studies.tolerance.kernel import kernel_of, many_of
 
 __all__ = ["METHODS", "Sampler", "Samples", "Sampling", "towards"]
 
@@ -32,11 +32,12 @@ Array = NDArray[np.float64]
 Method = Literal["monte-carlo", "quasi-monte-carlo"]
 METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
-BATCHES = 8  # of the kernel in a block, so that what a block costs by itself is little beside the analysis
-MOST = 2048  # samples in a block
+DRAWN = 216  # samples whose random numbers are drawn together, whatever the steps: part of what a seed means
+BLOCK = {"numpy": 8 * DRAWN, "compiled": 64 * DRAWN}  # samples in a block: what it costs by itself is little beside
 MOTIONS, MOTION = 16, 30_000  # samples in a block with motions in time; positions that take about as long as one
+PLACES = 360  # positions that the course of a sample over the cycle takes about as long as
 REPLICATES = 8  # independent scramblings, whose spread is the error
-CURVES = 1 << 22  # numbers of the curves of a measure that are kept, for the bands over the cycle
+CURVES, NUMBERS = 10_000, 1 << 25  # samples whose curves are kept for the bands over the cycle; most numbers of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,8 @@ class Samples:
 class Sampling:
     """A whole run: which mechanism, what is measured where, how many samples and how they are drawn.
 
-    model: plain data of the mechanism; rotation: see `towards`; each_alone: whether pins lie where their loads press
-    them, so that every sample is a mechanism by itself.
+    model: plain data of the mechanism; places: positions that a sample takes about as long as; rotation: see `towards`;
+    each_alone: whether pins lie where their loads press them, so that every sample is a mechanism by itself.
     """
 
     model: Mapping[str, Any]
@@ -71,32 +72,26 @@ class Sampling:
     seed: int
     engine: str
     friction: FrictionMethod
-    positions: int
+    places: int
     rotation: Array | None = None
     each_alone: bool = False
 
     @cached_property
     def block_size(self) -> int:
         """Samples in a block."""
-        most = self.drawing
-        if self.engine != "numpy":  # what pays to be compiled takes more at a time
-            most *= max(1, batch_of(self.engine, self.positions) // self.drawing)
-        if self.method == "monte-carlo":
-            return most
-        return min(1 << (most.bit_length() - 1), self._points)
+        size = self.drawing if self.drawing == MOTIONS else BLOCK[self.engine]
+        return size if self.method == "monte-carlo" else min(1 << (size.bit_length() - 1), self._points)
 
     @property
     def drawing(self) -> int:
-        """Samples whose random numbers are drawn together: the same by any engine."""
-        if self.each_alone or any(measure.in_time for measure in self.measures):
-            return MOTIONS
-        return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
+        """Samples whose random numbers are drawn together: the same by any engine and with any number of steps."""
+        return MOTIONS if self.each_alone or any(measure.in_time for measure in self.measures) else DRAWN
 
     @property
     def work(self) -> int:
         """Positions of all samples, with as many for each motion in time as take as long."""
         motions = {(measure.subject, measure.duration) for measure in self.measures if measure.in_time}
-        return self.samples * (self.positions + MOTION * (len(motions) + self.each_alone))
+        return self.samples * (self.places + MOTION * (len(motions) + self.each_alone))
 
     @cached_property
     def _points(self) -> int:
@@ -127,7 +122,8 @@ class Sampling:
         inputs = inputs_of(run)
         windows = plan(run, self.measures, self.steps).windows
         times = {name: window.time for name, window in windows.items()}
-        return Sampler(self, inputs, many_of(run, self.measures, inputs, self.friction, self.engine), times)
+        kernel = kernel_of(run, self.measures, self.friction, self.each_alone)
+        return Sampler(self, inputs, many_of(kernel, inputs, self.engine), times)
 
     def joined(self, parts: Sequence[Part]) -> Samples:
         """The samples of all blocks, in their order."""
@@ -177,9 +173,9 @@ class Sampler:
         ]
         return np.concatenate(parts, axis=1)
 
-    def figures(self, u: Array, curves: int = 0) -> Part:
-        """Figures, whether they conform and gravest status of samples drawn, and the curves of the first of them."""
-        reads = self.many.read(self.inputs.values(u, self.job.rotation), self.times if curves else {})
+    def figures(self, u: Array, shown: bool = False) -> Part:
+        """Figures, whether they conform and gravest status of samples drawn, and their curves if they are shown."""
+        reads = self.many.read(self.inputs.values(u, self.job.rotation), self.times if shown else {})
         count, measures = u.shape[1], self.job.measures
         rows = [reads[measure.name] for measure in measures]
         part: Part = {
@@ -190,12 +186,17 @@ class Sampler:
         passed = [within_limits(measure, figure, read.least, read.most) for measure, figure, read in judged]
         part["passed"] = np.array([np.broadcast_to(row, count) for row in passed], bool)
         for i, (measure, read) in enumerate(zip(measures, rows, strict=True)):
-            course = np.asarray(read.shown) if curves else np.empty((count, 1))
-            part[f"curve{i}"] = np.broadcast_to(course, (count, len(self.times[measure.name])))[:curves]
+            length = len(self.times[measure.name])
+            part[f"curve{i}"] = np.broadcast_to(read.shown, (count, length)) if shown else np.empty((0, length))
         return part
 
     def __call__(self, block: int) -> Part:
         """What is known of the samples of a block."""
+        u, before = self.drawn(block), block * self.job.block_size
+        kept = min(CURVES, NUMBERS // max(map(len, self.times.values()))) - before
+        kept = min(max(kept, 0), u.shape[1])
+        ends = [(0, kept, True), (kept, u.shape[1], False)]
         with np.errstate(all="ignore"):
-            most = CURVES // self.job.positions
-            return self.figures(self.drawn(block), max(most - block * self.job.block_size, 0))
+            parts = [self.figures(u[:, low:high], shown) for low, high, shown in ends if low < high]
+        return {name: np.concatenate([part[name] for part in parts], axis=0 if name.startswith("curve") else -1)
+                for name in parts[0]}  # fmt: skip

@@ -21,14 +21,16 @@ from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.tolerance.first_order import FEW, Outcome, study
-from trunnion.studies.tolerance.result import dataset
+from trunnion.cycle.positions import check_steps
+from trunnion.studies.tolerance.linear import study
+from trunnion.studies.tolerance.result import Outcome, dataset
 
 __all__ = ["DEFAULT_METHODS", "Method", "check_share", "tolerance"]
 
 Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
+FEW = 10_000_000  # configurations up to which further processes cost more than they save
 MOST_SAMPLES = 10**8  # whose figures are kept, 9 bytes a measure
 
 
@@ -92,12 +94,13 @@ def tolerance(
     """
     methods, notes = tuple(dict.fromkeys(methods)), list[Finding]()
     _check(methods, samples, seed, target)
-    prepared = study(mechanism, measures, steps, at, friction_method)
+    check_steps(steps)
+    prepared = study(mechanism, measures, at, friction_method)
     worst = prepared.worst() if "worst-case" in methods else None
     drawn, shares = None, None
     if (method := next((sampling for sampling in methods if sampling in SAMPLINGS), None)) is not None:
         # the workers of a cluster may have no other
-        job = prepared.sampling(method, samples, seed, "numpy" if cluster and engine == "auto" else engine)
+        job = prepared.sampling(method, samples, seed, "numpy" if cluster and engine == "auto" else engine, steps)
         if engine == "auto" and job.engine != "numpy":
             what = f"the samples are computed by the engine {job.engine}"
             notes.append(Finding.note("samples.engine", "samples", what, engine=job.engine))
@@ -122,7 +125,7 @@ def tolerance(
         # each number is to have its own coordinates of the points
         plain = replace(prepared.sampling("quasi-monte-carlo", samples, seed, engine), rotation=None)
         shares = indices(plain.prepare(), samples, seed)
-    return dataset(Outcome(prepared, tuple(methods), worst, drawn, shares, target), [*prepared.told, *notes])
+    return dataset(Outcome(prepared, steps, tuple(methods), worst, drawn, shares, target), [*prepared.notes, *notes])
 
 
 def _check(methods: Sequence[str], samples: int, seed: int, target: float | None) -> None:

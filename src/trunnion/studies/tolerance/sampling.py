@@ -32,8 +32,8 @@ Array = NDArray[np.float64]
 Method = Literal["monte-carlo", "quasi-monte-carlo"]
 METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
-DRAWN = 216  # samples whose random numbers are drawn together, whatever the steps: part of what a seed means
-BLOCK = {"numpy": 8 * DRAWN, "compiled": 64 * DRAWN}  # samples in a block: what it costs by itself is little beside
+DRAWN = 2048  # samples whose random numbers are drawn together, whatever the steps: part of what a seed means
+BLOCK = {"numpy": DRAWN, "compiled": 8 * DRAWN}  # samples in a block
 MOTIONS, MOTION = 16, 30_000  # samples in a block with motions in time; positions that take about as long as one
 PLACES = 360  # positions that the course of a sample over the cycle takes about as long as
 REPLICATES = 8  # independent scramblings, whose spread is the error

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ from trunnion.solve.space.determinacy import spins_of
 from trunnion.statistics.population import Population
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.inputs import Inputs, plays_of
-from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, stated_or_outputs
+from trunnion.studies.tolerance.linear import Table, ToleranceStudy, stated_or_outputs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,40 +99,42 @@ class JointEffects(NamedTuple):
 class Played:
     """What play does to measures over the cycle, and at the one place of each.
 
-    measures: as they were asked for; courses: of all of them at every position; figures: of each at its place, which is
-    a stated one, that of a maximum or minimum, or where its worst case is largest; over_cycle, at_places: what the
-    joints do there.
+    measures: as they were asked for; table: their courses; figures: of each at its place, which is a stated one, that
+    of a maximum or minimum, or where its worst case is largest; over_cycle, at_places: what the joints do there.
     """
 
     run: Run
     measures: Sequence[Measure]
-    courses: ToleranceStudy
     table: Table
     figures: ToleranceStudy
     over_cycle: list[JointEffects]
     at_places: list[JointEffects]
 
     @property
-    def inputs(self) -> Inputs:
-        """The plays."""
-        return self.courses.inputs
-
-    @property
-    def status(self) -> NDArray[np.int8]:
-        """Of every position."""
-        return self.table.status
-
-    @property
-    def time(self) -> Array:
-        """Times of the positions, s."""
-        return self.table.plan.times
+    def joints(self) -> tuple[str, ...]:
+        """Those with a play."""
+        return self.figures.inputs.loose
 
     def place(self, i: int) -> str:
         """Where in the cycle the place of a measure is, in words."""
-        time = self.figures.orders[i].time
-        near = float(self.time[np.argmin(np.abs(self.time - time))])
+        time, times = self.figures.orders[i].time, self.table.plan.times
+        near = float(times[np.argmin(np.abs(times - time))])
         time = near if abs(time - near) <= BESIDE * self.run.cycle.duration else time
         return self.run.system.dial(self.run.values, np.array([time])).at(0)
+
+    def kind_of_place(self, i: int) -> str:
+        """What the place of a measure is, for tables: empty where it is stated."""
+        measure = self.measures[i]
+        if measure.at is not None or len(self.table.plan.times) == 1:
+            return ""
+        return f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
+
+    def limit(self, i: int) -> float | None:
+        """The deviation allowed to either side where a measure is judged: at its place, or at every position."""
+        measure = self.measures[i]
+        sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
+        placed = measure.at is not None or measure.rule in EXTREMES
+        return min(sides) if placed and sides else measure.limit
 
 
 @strict_arguments
@@ -172,33 +174,33 @@ def play(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    measures_chosen, notes = _measures(run, measures)
-    plays = plays_of(run)
-    if not plays:
+    picked, notes = _measures(run, measures)
+    loose = tuple(plays_of(run))
+    if not loose:
         remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
         raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
     value, timed = (None, False) if at is None else place_of(mechanism, at)
-    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in measures_chosen]
+    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in picked]
     if run.cycle.duration <= 0:  # there is one position
         courses = [replace(measure, statistic="value") for measure in courses]
-    inputs_of_plays = Inputs(run, (), tuple(plays), (), (), Population([], None))
-    over_cycle = figures = ToleranceStudy(run, inputs_of_plays, tuple(courses), FrictionMethod())
+    varying = Inputs(run, (), loose, (), (), Population([], None))
+    over_cycle = figures = ToleranceStudy(run, varying, tuple(courses), FrictionMethod())
     if at is not None or run.cycle.duration <= 0:
-        measures_chosen = courses
+        picked = courses
     else:
-        largest = [order.time for order in over_cycle.orders]
         placed = [
-            replace(measure, at=time, timed=True) if measure.rule == "deviation" and np.isfinite(time) else measure
-            for measure, time in zip(measures_chosen, largest, strict=True)
-        ]
+            replace(measure, at=order.time, timed=True)
+            if measure.rule == "deviation" and np.isfinite(order.time) else measure
+            for measure, order in zip(picked, over_cycle.orders, strict=True)
+        ]  # fmt: skip
         figures = replace(over_cycle, measures=tuple(placed))
     table = over_cycle.table(steps)
     singular = np.where(table.status >= Status.SINGULAR, np.nan, 0.0)  # there is no answer
-    played = Played(
-        run, measures_chosen, over_cycle, table, figures,
-        [_by_joint(course, singular + 0.0 * curve) for course, curve in zip(table.courses, table.curves, strict=True)],
-        [_by_joint(of.figure, np.zeros(())) for of in figures.orders],
-    )  # fmt: skip
+    by_position = [
+        _by_joint(course, singular + 0.0 * curve) for course, curve in zip(table.courses, table.curves, strict=True)
+    ]
+    at_places = [_by_joint(order.figure, np.zeros(())) for order in figures.orders]
+    played = Played(run, picked, table, figures, by_position, at_places)
     return _dataset(played, [*_findings(played), *notes])
 
 
@@ -213,13 +215,11 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
         if (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
     ]  # fmt: skip
     others = [measure.name for measure in measures if measure not in covered]
-    remedy, notes = "use `trunnion tolerance` for other measures", []
+    what = f"play covers measures with one value at every position, which {', '.join(others)} has not"
+    remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
-        what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
         raise MechanismError(Finding(what, "measures", remedy))
-    if others:
-        what = f"left out: {', '.join(others)}, which have no one value at every position"
-        notes = [Finding.note("play.measures_left_out", "measures", what, remedy, measures=others)]
+    notes = [Finding.note("play.measures_left_out", "measures", what, remedy, measures=others)] if others else []
     covered, outputs_taken = stated_or_outputs(run, covered)
     return covered, [*outputs_taken, *notes]
 
@@ -228,8 +228,7 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
     """What first order makes of each play. blank: 0, or NaN where there is no answer."""
     inputs, ends = first.inputs, max(len(first.inputs.ends(joint)) for joint in first.inputs.loose)
     shape = (len(inputs.loose), *first.slope.shape[1:])
-    loads = np.full((shape[0], ends, 3, *shape[1:]), np.nan)
-    effects = JointEffects(np.zeros(shape), np.zeros(shape), loads)
+    effects = JointEffects(np.zeros(shape), np.zeros(shape), np.full((shape[0], ends, 3, *shape[1:]), np.nan))
     for j, joint in enumerate(inputs.loose):
         carriers = first.plays(j)
         worst = np.array([pin.worst for pin in carriers])
@@ -239,7 +238,8 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
         for k, keys in enumerate(inputs.ends(joint)):
             at_end = np.array([pin.loads[k] for pin in carriers])  # (carrier, component, …)
             for key, load in zip(keys, np.moveaxis(at_end, 1, 0), strict=True):
-                loads[j, k, "xyz".index(key.rpartition(".")[2])] = np.take_along_axis(load, best, axis=0)[0]
+                axis = "xyz".index(key.rpartition(".")[2])
+                effects.loads[j, k, axis] = np.take_along_axis(load, best, axis=0)[0]
     return JointEffects(*(part + blank for part in effects))
 
 
@@ -247,12 +247,11 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
 
 
 def _findings(played: Played) -> Iterator[Finding]:
-    run, mechanism, loose = played.run, played.run.system.mechanism, played.inputs.loose
+    run, mechanism = played.run, played.run.system.mechanism
     yield from of_run(run, notes=False)
     if run.determinacy is not None and any(part.redundant for part in run.determinacy.parts):
         what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
-        remedy = "the deviation assumes that each pin can be anywhere within its play"
-        yield Finding.warning("play.redundant", "joints", what, remedy)
+        yield Finding.warning("play.redundant", "joints", what)
     models = CLEARANCE_MODELS[mechanism.space]
     kinds = [
         f"{name} ({kind})" for name, (kind, _) in run.system.joints.items()
@@ -261,115 +260,69 @@ def _findings(played: Played) -> Iterator[Finding]:
     if kinds:
         what, remedy = f"the play of {', '.join(kinds)} is left out", f"play is modelled in {', '.join(models)} joints"
         yield Finding.warning("play.left_out", "joints", what, remedy, joints=kinds)
-    toothed = sorted({
-        joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints if joint in loose
-    })  # fmt: skip
-    if toothed:
+    touching = {joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints}
+    if toothed := sorted(touching & {*played.joints}):
         what = f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out"
-        remedy = "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius"
-        yield Finding.warning("play.gears", "gears", what, remedy, joints=toothed)
+        yield Finding.warning("play.gears", "gears", what, joints=toothed)
     for _, (link, *ends), members in spins_of(run.system):
         for measure in played.measures:
             owner, _, point = measure.subject.partition(".")
             if owner in members and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
                 what = f"'{owner}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
-                remedy, figures = "measure one of these two points", {"link": link, "points": list(ends)}
-                yield Finding.warning("play.spin", f"measures.{measure.name}", what, remedy, **figures)
+                figures = {"link": link, "points": list(ends)}
+                yield Finding.warning("play.spin", f"measures.{measure.name}", what, **figures)
     if run.seats:
-        what = "play is relative to the middle of the holes: the worst case is over all positions of the pins and "
-        what += f"does not use the seats of {', '.join(seat.joint for seat in run.seats)}"
+        seated = [seat.joint for seat in run.seats]
+        what = f"play is relative to the middle of the holes, whatever the seats of {', '.join(seated)}"
         remedy = "`trunnion analyse` has the deviation with these seats"
-        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[seat.joint for seat in run.seats])
-    yield from _fits(run, loose)
-    dial, remedy = run.system.dial(run.values, played.time), "the effect of play is undefined there"
+        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=seated)
+    status, dial = played.table.status, run.system.dial(run.values, played.table.plan.times)
     for i, measure in enumerate(played.measures):
         yield from _of_measure(played, i)
-        yield from _beyond_first_order(played, i, played.figures.orders[i])
-        lost = np.any(np.isnan(played.over_cycle[i].worst_case), axis=0)
-        lost &= np.isfinite(played.table.curves[i]) & (played.status < Status.SINGULAR)
-        if lost.any():
-            at = dial.intervals(np.flatnonzero(lost))
+        lost = np.any(np.isnan(played.over_cycle[i].worst_case), axis=0) & np.isfinite(played.table.curves[i])
+        if np.any(lost & (status < Status.SINGULAR)):
+            at = dial.intervals(np.flatnonzero(lost & (status < Status.SINGULAR)))
             what = f"a magnitude that is 0 has no derivative {at}"
-            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, remedy, at=at)
+            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, at=at)
     for code in Status:
-        where = np.flatnonzero(played.status == code)
+        where = np.flatnonzero(status == code)
         if code >= Status.NOT_CONVERGED and len(where):
             at = dial.intervals(where)
-            yield Finding.error("play.no_answer", "", f"{code.text} {at}", remedy, at=at, status=code.text)
-
-
-def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
-    """Plays that are the mean of a fit, with the largest that its limits allow."""
-    mechanism, limits = run.system.mechanism, run.system.mechanism.tolerances()
-    largest: dict[str, float] = {}
-    for name in loose if mechanism.fits == "mean" else ():
-        hole, pin = (f"joints.{name}.pin.{key}" for key in ("hole_radius", "radius"))
-        joint = mechanism.effective_joints[name]
-        if joint.pin is not None and joint.pin.fit is not None and {hole, pin} <= limits.keys():
-            largest_clearance = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
-            largest[name] = float(np.ravel(primal(largest_clearance))[0])
-    if largest:
-        most = max(largest, key=largest.__getitem__)
-        what = f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
-        what += f"{readable(largest[most], 'm')}, of {most}"
-        remedy = "--set fits=maximum takes the largest play"
-        figures = {"joints": list(largest), "largest": largest[most], "most": most}
-        yield Finding.note("play.mean_of_fits", "fits", what, remedy, **figures)
-
-
-def _judged_limit(measure: Measure) -> float | None:
-    """The deviation that is allowed to either side where the measure is judged: at its place, or at every position."""
-    sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
-    placed = measure.at is not None or measure.rule in EXTREMES
-    return min(sides) if placed and sides else measure.limit
+            yield Finding.error("play.no_answer", "", f"{code.text} {at}", at=at, status=code.text)
 
 
 def _of_measure(played: Played, i: int) -> Iterator[Finding]:
-    """Whether the worst case of a measure keeps its limit, and joints whose play does nothing to it."""
-    run, measure, course = played.run, played.measures[i], played.table.curves[i]
-    limit, worst, unit = _judged_limit(measure), float(np.sum(played.at_places[i].worst_case)), measure.unit(run.system)
-    if limit is not None and np.isfinite(worst):
-        where, figures = f"measures.{measure.name}.limit", {"worst": worst, "limit": limit, "at": played.place(i)}
-        what = f"the worst case to first order, {readable(worst, unit)} at {played.place(i)}, "
-        allowed = f"the limit of {readable(limit, unit)}"
-        if worst <= limit:
-            yield Finding.note("limit.kept", where, f"{what}is within {allowed}", **figures)
-        else:
-            remedy = "reduce the play of the joints with the largest share"
-            yield Finding.error("limit.exceeded", where, f"{what}exceeds {allowed}", remedy, **figures)
-    floor = scales_of(run).floor(unit)
-    largest = np.nanmax(played.over_cycle[i].worst_case.reshape(len(played.inputs.loose), -1), axis=1, initial=0.0)
-    joints = [joint for joint, most in zip(played.inputs.loose, largest, strict=True) if most <= floor]
-    if joints and np.any(np.isfinite(course)):
-        what, figures = (
-            f"the play of {', '.join(joints)} has no effect on it",
-            {"joints": joints, "measure": measure.name},
-        )
-        yield Finding.note("play.no_effect", f"measures.{measure.name}", what, **figures)
-
-
-def _beyond_first_order(played: Played, i: int, of: MeasureOrder) -> Iterator[Finding]:
-    """A measure that pins at the rims of their holes change otherwise than first order says, at its place.
+    """Whether the worst case of a measure keeps its limit, and whether pins at the rims of their holes change it
+    otherwise than first order says.
 
     One of forces is not looked at where a joint is at rest: there the pins turn the sense of its friction.
     """
-    measure, study, first = played.measures[i], played.figures, float(np.sum(played.at_places[i].worst_case))
-    if not (first > 0 and np.isfinite(first)):
+    measure, study, order = played.measures[i], played.figures, played.figures.orders[i]
+    limit, first = played.limit(i), float(np.sum(played.at_places[i].worst_case))
+    unit, where = measure.unit(played.run.system), f"measures.{measure.name}"
+    if not np.isfinite(first):
         return
-    if not measure.of_motion:
-        _, status = study.kernel.courses(study.run.values, np.array([of.time]))
-        if np.ravel(status)[0] != Status.SOLVED:
-            return
-    least, largest = study.searched(of)
+    place = played.place(i)
+    if limit is not None:
+        figures: dict[str, Any] = {"worst": first, "limit": limit, "at": place}
+        what = f"the worst case to first order, {readable(first, unit)} at {place}, "
+        allowed = f"the limit of {readable(limit, unit)}"
+        if first <= limit:
+            yield Finding.note("limit.kept", f"{where}.limit", f"{what}is within {allowed}", **figures)
+        else:
+            remedy = "reduce the play of the joints with the largest share"
+            yield Finding.error("limit.exceeded", f"{where}.limit", f"{what}exceeds {allowed}", remedy, **figures)
+    solved = measure.of_motion or study.kernel.courses(study.run.values, np.array([order.time]))[1] == Status.SOLVED
+    if not (first > 0 and np.all(solved)):
+        return
+    least, largest = study.searched(order)
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
     if off > SLIGHT and least.assembles and largest.assembles:  # else pins cannot get there
-        unit, place = measure.unit(played.run.system), played.place(i)
         severity = Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE
         what = f"to first order it changes by ±{readable(first, unit)} at {place}; the worst found on the mechanism "
         what += f"itself is {readable(low, unit)} and {readable(high, unit)}"
         figures = {"low": low, "high": high, "first": first, "unit": unit, "at": place}
-        where = f"measures.{measure.name}"
         yield Finding.weighed(severity, "play.beyond_first_order", where, what, "use these figures", **figures)
 
 
@@ -378,67 +331,56 @@ def _beyond_first_order(played: Played, i: int, of: MeasureOrder) -> Iterator[Fi
 
 def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     """The arrays with names, units, summary and provenance."""
-    run, system, mechanism = played.run, played.run.system, played.run.system.mechanism
+    run, system, mechanism, table = played.run, played.run.system, played.run.system.mechanism, played.table
     worst, deviation, loads = (np.array(parts) for parts in zip(*played.over_cycle, strict=True))
-    places = played.at_places
+    worst_there, deviation_there, _ = (np.array(parts) for parts in zip(*played.at_places, strict=True))
+    radii = np.full((len(played.joints), loads.shape[2]), np.nan)
+    for row, joint in zip(radii, played.joints, strict=True):
+        for end, radius in enumerate(played.figures.inputs.play(joint, run.values).radii):
+            row[end] = max(float(np.ravel(primal(radius))[0]), 0.0)
     arrays: dict[str, Array | NDArray[np.int8]] = {
-        "value": np.array(played.table.curves),
+        "value": np.array(table.curves),
         "worst_case": worst,
         "deviation": deviation,
         "worst_case_total": np.sum(worst, axis=1),
         "rss": np.sqrt(np.sum(worst**2, axis=1)),
         "deviation_total": np.sqrt(np.sum(deviation**2, axis=1)),
         "sensitivity": loads,
-        "radius": _radii(played.inputs, loads.shape[2]),
-        "status": played.status,
-        "extreme_worst_case": np.array([place.worst_case for place in places]),
-        "extreme_deviation": np.array([place.deviation for place in places]),
-        "extreme_time": np.array([of.time for of in played.figures.orders]),
+        "radius": radii,
+        "status": table.status,
+        "extreme_worst_case": worst_there,
+        "extreme_deviation": deviation_there,
+        "extreme_time": np.array([order.time for order in played.figures.orders]),
     }
-    units = [measure.unit(system) for measure in played.measures]
+    units, count = [measure.unit(system) for measure in played.measures], len(played.measures)
     plain_units, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
     labels = {
         "measure": [measure.name for measure in played.measures],
-        "joint": list(played.inputs.loose),
+        "joint": list(played.joints),
         "end": [str(k + 1) for k in range(loads.shape[2])],
         "axis": ["x", "y", "z"],
     }
-    dial = system.dial(run.values, played.time)
+    dial = system.dial(run.values, table.plan.times)
     attributes = {
         **origin(mechanism, system.plan.formula),
         **cited(references(mechanism)),
-        "limits": [_judged_limit(measure) for measure in played.measures],
+        "limits": [played.limit(i) for i in range(count)],
         "inputs": inputs(mechanism),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(run.cycle.periodic),
-        "places": [[_kind_of_place(played, i), played.place(i)] for i in range(len(units))],
+        "places": [[played.kind_of_place(i), played.place(i)] for i in range(count)],
         **scales_of(run).summary(_summary(played, units)),
         "findings": finding_rows(findings),
     }
     variables = described(arrays, VARIABLES, {"measure": plain_units, "sensitivity": per_length})
-    return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))
-
-
-def _radii(inputs: Inputs, ends: int) -> Array:
-    radii = np.full((len(inputs.loose), ends), np.nan)
-    for row, joint in zip(radii, inputs.loose, strict=True):
-        radii_of = inputs.play(joint, inputs.run.values).radii
-        row[: len(radii_of)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in radii_of]
-    return radii
-
-
-def _kind_of_place(played: Played, i: int) -> str:
-    """What the place of a measure is, for tables: empty where it is stated."""
-    measure = played.measures[i]
-    is_place = measure.at is not None or len(played.time) == 1
-    return "" if is_place else f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
+    return dataset_of("play", variables, labels, attributes, driven(table.plan.times, *dial))
 
 
 def _summary(played: Played, units: Sequence[str]) -> Iterator[Figure]:
     """Of each measure the worst case at its place: what each joint has in it, RSS and deviation."""
     for i, (measure, unit) in enumerate(zip(played.measures, units, strict=True)):
-        name, at_place, kind = measure.name, played.at_places[i], _kind_of_place(played, i)
+        name, at_place, kind = measure.name, played.at_places[i], played.kind_of_place(i)
         total = float(np.sum(at_place.worst_case))
         if not np.isfinite(total):
             yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", None, unit)
@@ -449,5 +391,5 @@ def _summary(played: Played, units: Sequence[str]) -> Iterator[Figure]:
         rss, deviation = (float(np.sqrt(np.sum(part**2))) for part in (at_place.worst_case, at_place.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
-        for joint, effect in zip(played.inputs.loose, at_place.worst_case, strict=True):
+        for joint, effect in zip(played.joints, at_place.worst_case, strict=True):
             yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", float(effect), unit)

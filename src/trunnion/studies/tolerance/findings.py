@@ -15,13 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.cycle.model_findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.checks.check import check_values
-from trunnion.model.parameters import measured
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.results.scales import extreme_place
@@ -36,8 +34,6 @@ __all__ = ["findings_of", "summary"]
 
 Array = NDArray[np.float64]
 Sampled = Mapping[str, Any]  # arrays by the names of `result.VARIABLES`
-TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
-FAR_OFF = 0.2  # between the worst cases of first order and of the search, of which it is said
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that first order does not explain, and samples for it
 
@@ -191,37 +187,23 @@ def _remedy(outcome: Outcome, of: MeasureOrder) -> str:
 
 
 def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
-    """Measured deviations outside the limits of their numbers; limits that let a number be what the model itself would
-    refuse, or a length turn round, each name once."""
-    study, mechanism = outcome.study, outcome.study.run.system.mechanism
-    numbers, kinds = copy(mechanism.parameter_set), measured(mechanism, mechanism.parameter_set.entries.values())
-    names, paths_seen = mechanism.variations_by_path, set()
-    far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
-    for tolerance in study.inputs.tolerances:
-        values = np.atleast_1d(np.asarray(tolerance.options.get("values", 0.0)))
-        outside = values[(values < tolerance.lower) | (values > tolerance.upper)]
-        if tolerance.distribution == "sample" and len(outside):
-            figures: dict[str, Any] = {"count": len(outside), "of": len(values), "farthest": np.max(np.abs(outside))}
-            what = f"{len(outside):,} of {len(values):,} measured deviations are outside the tolerance "
-            what += f"{tolerance.lower:g} to {tolerance.upper:g} (SI units)"
-            remedy = "check the unit of the data"
-            yield Finding.warning("tolerance.measured_outside", tolerance.path, what, remedy, **figures)
-    for tolerance, end in product(study.inputs.tolerances, ("lower", "upper")):
+    """Limits that let a number be what the model itself would refuse, each name once."""
+    mechanism = outcome.study.run.system.mechanism
+    numbers, nominal = copy(mechanism.parameter_set), mechanism.parameter_set.nominal
+    names, refused = mechanism.variations_by_path, set()
+    for tolerance, end in product(outcome.study.inputs.tolerances, ("lower", "upper")):
         where = f"tolerances.{names[tolerance.path][0]}" if tolerance.path in names else tolerance.path
-        deviation, unit = getattr(tolerance, end), kinds[tolerance.path].unit
-        if (where, end) in paths_seen or not np.isfinite(deviation):
+        deviation = getattr(tolerance, end)
+        if (where, end) in refused or not np.isfinite(deviation):
             continue
-        paths_seen.add((where, end))
         alias = numbers.entries[tolerance.path].alias or tolerance.path
         numbers.nominal = mechanism.parameters(deviations={alias: deviation})
-        changed = [path for path, value in numbers.nominal.items() if value != mechanism.parameter_set.nominal[path]]
+        changed = [path for path, value in numbers.nominal.items() if value != nominal[path]]
         checked = check_values(mechanism, numbers, changed)
-        refused = next((finding for finding in checked if finding.severity is Severity.ERROR), None)
-        reached, long = tolerance.nominal + deviation, tolerance.path.startswith("dimensions.") and unit == "m"
-        if refused or (long and reached < 0 and tolerance.nominal > far):
-            why = f", which no model may have: {refused.where} {refused.what}" if refused else ""
-            what = f"its tolerance includes {readable(reached, unit)}{why}"
-            yield Finding.warning("tolerance.impossible", where, what, "narrow the tolerance", value=reached)
+        if wrong := next((finding for finding in checked if finding.severity is Severity.ERROR), None):
+            refused.add((where, end))
+            what = f"its tolerance includes values which no model may have: {wrong.where} {wrong.what}"
+            yield Finding.warning("tolerance.impossible", where, what, value=tolerance.nominal + deviation)
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:
@@ -244,13 +226,12 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
 
 
 def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: MeasureOrder) -> Iterator[Finding]:
-    """A measure of which first order knows nothing, or whose worst case or scatter is another on the mechanism."""
+    """A measure of which first order knows nothing, or whose corner or scatter is another on the mechanism."""
     study, where, remedy = outcome.study, f"measures.{of.measure.name}", "use the samples"
-    lower, upper = float(of.total.lower), float(of.total.upper)
     if of.rests and not of.measure.of_motion:
         what = "a joint is momentarily at rest there: friction jumps, and the first-order result is one-sided"
         yield Finding.warning("first_order.one_sided", where, what, remedy)
-    if not np.isfinite(upper):
+    if not np.isfinite(of.total.upper):
         yield Finding.warning("first_order.no_answer", where, "the first-order analysis has no result", remedy)
     elif outcome.worst is not None:
         least, most = outcome.worst[i]
@@ -259,12 +240,6 @@ def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: MeasureO
                 what = f"no result at the tolerance limits that give the {end} deviation to first order"
                 steady = f": {not_steady(study.run, of.measure)}" if of.measure.in_time else ""
                 yield Finding.warning("first_order.corner_open", where, f"{what}{steady}", remedy, end=end)
-        size, searched = max(-lower, upper), max(-least.value, most.value)
-        if np.isfinite(searched) and abs(searched - size) > FAR_OFF * max(size, searched) > 0:
-            ratio = searched / size if size else np.inf
-            times = "∞" if np.isinf(ratio) else f"{ratio:.2f}"
-            what = f"the worst case found by search is {times} times the first-order one"
-            yield Finding.note("first_order.worst_case_differs", where, what, "use the searched one", ratio=ratio)
     if sampled is not None and int(sampled["samples"]) >= ENOUGH and not of.by_place:
         drawn, linear = float(sampled["deviation"][i]), float(of.total.deviation)
         if max(drawn, linear) > OTHERWISE * min(drawn, linear):  # not of NaN

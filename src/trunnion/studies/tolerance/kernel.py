@@ -99,8 +99,13 @@ class LoadedKernel(MotionKernel):
         times = np.broadcast_to(time, shape).reshape(-1, shape[-1])
         runs = [self._run(values, lane) for lane in range(lanes_of(values))]
         times = times.reshape(1, -1) if len(runs) == 1 else times  # of one mechanism all at once
-        solved = [SeatedKernel(run, self.measures, self.method).courses(run.values, place)
-                  for run, place in zip(runs, times, strict=True)]  # fmt: skip
+        once: dict[tuple[int, bytes], tuple[Curves, NDArray[np.int8]]] = {}  # derivatives have one mechanism many times
+        solved = []
+        for run, place in zip(runs, times, strict=True):
+            key = id(run), place.tobytes()
+            if key not in once:
+                once[key] = SeatedKernel(run, self.measures, self.method).courses(run.values, place)
+            solved.append(once[key])
         curves = {
             measure.name: tuple(
                 np.array([np.broadcast_to(part, times.shape[-1:]) for part in parts]).reshape(shape)

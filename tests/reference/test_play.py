@@ -30,7 +30,6 @@ from played import (
     rssr,
     with_play,
 )
-from toleranced import slider_crank as sized_slider
 from trunnion import Mechanism
 from trunnion.joints.clearance import worst_case
 from trunnion.measures.measures import named, outputs
@@ -251,15 +250,6 @@ def test_redundant_constraints_make_it_a_bound() -> None:
         mechanism = trunnion.Mechanism(**{**mechanism.data(), "over_constraint": "minimum-norm"})
     result = trunnion.play(with_play(mechanism.data()), steps=12)
     assert any(row["code"] == "play.redundant" for row in json.loads(result.attrs["findings"]))
-
-
-def test_play_that_is_the_mean_of_a_fit_tells_the_largest() -> None:
-    """50 H7/f7: hole +25/0 µm, shaft −25/−50 µm in diameter, so 25 µm on the radius in the mean and 37.5 at most."""
-    fits = {"pin": {"fit": "50 mm H7/f7"}}
-    for choice, told in (("mean", [37.5e-6]), ("maximum", [])):
-        model = sized_slider(joint_defaults=fits, fits=choice)
-        found = trunnion.play(model, ["slide:C"], steps=8).trunnion.findings
-        assert [one.figures["largest"] for one in found if one.code == "play.mean_of_fits"] == pytest.approx(told)
 
 
 STEPS, TRIALS = 24, 4000

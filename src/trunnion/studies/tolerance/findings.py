@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,19 +25,36 @@ from trunnion.model.checks.check import check_values
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.results.scales import extreme_place
-from trunnion.studies.tolerance.linear import limited
+from trunnion.studies.tolerance.indices import Indices
+from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, limited
 from trunnion.studies.tolerance.sampled import CAUSES
+from trunnion.studies.tolerance.sampling import Samples
+from trunnion.studies.tolerance.search import Corner
 
-if TYPE_CHECKING:
-    from trunnion.studies.tolerance.linear import MeasureOrder
-    from trunnion.studies.tolerance.result import Outcome
-
-__all__ = ["findings_of", "summary"]
+__all__ = ["Outcome", "findings_of", "summary"]
 
 Array = NDArray[np.float64]
 Sampled = Mapping[str, Any]  # arrays by the names of `result.VARIABLES`
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that first order does not explain, and samples for it
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
+
+    study: ToleranceStudy
+    steps: int
+    methods: tuple[str, ...]
+    worst: Sequence[tuple[Corner, Corner]] | None = None
+    samples: Samples | None = None
+    indices: Indices | None = None
+    target: float | None = None
+
+    @cached_property
+    def table(self) -> Table:
+        """The courses at the positions of the result."""
+        return self.study.table(self.steps)
 
 
 def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dial: Any) -> Iterator[Figure]:

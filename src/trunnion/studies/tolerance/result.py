@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,17 +18,14 @@ from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
 from trunnion.studies.tolerance.effects import Spread
-from trunnion.studies.tolerance.findings import findings_of, summary
-from trunnion.studies.tolerance.indices import Indices
+from trunnion.studies.tolerance.findings import Outcome, findings_of, summary
 from trunnion.studies.tolerance.linear import Table, ToleranceStudy
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
-from trunnion.studies.tolerance.sampling import Samples
-from trunnion.studies.tolerance.search import Corner
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Outcome", "course_text", "dataset", "text_of"]
+__all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
 
 Array = NDArray[np.float64]
 # units: "measure": that of each figure; "curve": of each course; "parameter": of each parameter; "ratio" and "curve
@@ -120,24 +115,6 @@ VARIABLES: dict[str, Variable] = {
     "total_order": Variable(MP, "1", "Sobol' index of total order: share with all its interactions"),
     **_interval("total_order", MP, "1", "total order"),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
-
-    study: ToleranceStudy
-    steps: int
-    methods: tuple[str, ...]
-    worst: Sequence[tuple[Corner, Corner]] | None = None
-    samples: Samples | None = None
-    indices: Indices | None = None
-    target: float | None = None
-
-    @cached_property
-    def table(self) -> Table:
-        """The courses at the positions of the result."""
-        return self.study.table(self.steps)
 
 
 def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:

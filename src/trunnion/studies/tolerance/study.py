@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.cycle.positions import check_steps
+from trunnion.studies.tolerance.findings import Outcome
 from trunnion.studies.tolerance.linear import study
-from trunnion.studies.tolerance.result import Outcome, dataset
+from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "Method", "check_share", "tolerance"]
 

@@ -55,8 +55,8 @@ _STUDIES = (
     Fault(
         "worst-minimum-taken-as-maximum",
         "studies/tolerance/linear.py",
-        "np.asarray(np.min(np.nan_to_num(end, nan=np.inf)))",
-        "np.asarray(np.max(np.nan_to_num(end, nan=-np.inf)))",
+        'extreme(end, 1.0 if measure.rule == "maximum" else -1.0)',
+        "extreme(end, 1.0)",
         ("tests/reference/test_tolerance.py", "-k", "worst_case_of_the_least"),
     ),
     Fault(

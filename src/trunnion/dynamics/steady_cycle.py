@@ -31,7 +31,7 @@ from trunnion.dynamics.rates import Dynamics, Layout
 from trunnion.dynamics.result import filled
 from trunnion.dynamics.solution import Solution, over_steps, step_nodes
 from trunnion.dynamics.start import Places, initial_row, places
-from trunnion.dynamics.started import SPEED, DriveCourse
+from trunnion.dynamics.started import BACKWARD, SPEED, TURN, DriveCourse
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
@@ -99,7 +99,6 @@ def motion_law(repeated: Repeated) -> MotionLaw:
     )
 
 
-TURN = 2 * np.pi
 FINER = 1e-2  # of the tolerance of a run-up: that of the cycles that are compared
 LONGER = (1, 4, 16)  # times the duration: how far a run-up goes on if its end leads to no steady cycle
 REPEATED = 1e-8  # of the state: by how much the end of a steady cycle may miss its begin
@@ -110,7 +109,6 @@ HALVED = (1.0, 0.5, 0.25, 0.125)  # of its step, until the next with the same de
 FAR = 20.0  # times the speed at the end of the run-up: the steady speed is not looked for beyond
 NUDGE = 1e-4  # of the state, by which ∂P/∂x is taken
 INDIFFERENT = 1e-6  # what is left of a difference beyond all of it, but for rounding
-BACKWARD = 1e-9  # of a turn, by which one that goes round and round may seem to go back
 DIFFERS = 1e-3  # of the largest effort: a cycle that is not the one that was found
 
 
@@ -318,7 +316,9 @@ class Section:
                 period = course.when(abs(self.way))
                 miss = solution.at(np.array([period]))[0][self.which, 0] - state
                 miss[self.turning] = np.mod(miss[self.turning] + np.pi, TURN) - np.pi
-                return miss / self.scale, _until(solution, period)
+                steps = [step._replace(end=min(step.end, period)) for step in solution.stretches if step.begin < period]
+                events = [event for event in solution.events if event.time <= period]
+                return miss / self.scale, replace(solution, stretches=steps, events=events)
             if solution.ended:
                 return None
         return None
@@ -364,9 +364,3 @@ class Section:
         speed = self.layout.coordinates + self.first
         share = state[self.which == speed][0] / self.row[speed]
         return bool(np.all(np.isfinite(state)) and 1 / FAR < share < FAR)
-
-
-def _until(solution: Solution, time: float) -> Solution:
-    """A solution up to a time."""
-    stretches = [each._replace(end=min(each.end, time)) for each in solution.stretches if each.begin < time]
-    return replace(solution, stretches=stretches, events=[each for each in solution.events if each.time <= time])

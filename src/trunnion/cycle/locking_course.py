@@ -28,8 +28,9 @@ from trunnion.results.quantities import readable
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
+from trunnion.solve.continuation import largest
 from trunnion.solve.forward import Forward
-from trunnion.solve.friction import FrictionProblem, frictionless, largest, scaled
+from trunnion.solve.friction import FrictionProblem, frictionless, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import least_beside, margin_in

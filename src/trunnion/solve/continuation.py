@@ -13,9 +13,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from trunnion.algebra import linalg
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, looped
 
-__all__ = ["System", "follow"]
+__all__ = ["System", "follow", "largest"]
 
 System = Callable[[Sequence[Number], Number], tuple[list[Number], list[list[Number]]]]
 
@@ -103,15 +104,15 @@ def _correct(
         residual, jacobian = system(x, share)
         move, fresh = linalg.solve_and_determinant(jacobian, residual)
         # not by the last move, which rounding keeps from ending where the unknowns run to infinity
-        done = _largest(residual) <= CLOSED * _largest(x) + TINY
+        done = largest(residual) <= CLOSED * largest(x) + TINY
         ahead = (going > 0) & ~done & (fresh > 0)
         x = [np.where(ahead, value - delta, value) for value, delta in zip(x, move, strict=True)]
         determinant = np.where(going > 0, fresh, determinant)
         return [*x, determinant, np.where((going > 0) & done, 1.0, closed), np.where(ahead, 1.0, 0.0)]
 
     *x, determinant, closed, _ = looped(correction, [*aim, determinant, 0.0 * calm, calm], NEWTON_LIMIT, _ended)
-    first, size = _largest(move), _largest(x)
-    astray = _largest([a - b for a, b in zip(x, aim, strict=True)])
+    first, size = largest(move), largest(x)
+    astray = largest([a - b for a, b in zip(x, aim, strict=True)])
     near = (astray <= NEAR_AIM * first) | (first + astray <= TINY_MOVE * size)
     good = (closed > 0) & (determinant > 0) & near & np.isfinite(size)
     return x, determinant, good, astray <= STRAIGHT * first
@@ -122,5 +123,6 @@ def _ended(now: Sequence[Number]) -> Number:
     return ~(now[-1] > 0)
 
 
-def _largest(values: Sequence[Number]) -> Number:
-    return functools.reduce(np.maximum, [np.abs(value) for value in values])
+def largest(values: Sequence[Number]) -> Number:
+    """Largest magnitude, elementwise; NaN if one is NaN."""
+    return functools.reduce(np.maximum, [np.abs(primal(value)) for value in values])

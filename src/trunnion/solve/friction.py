@@ -32,11 +32,11 @@ from trunnion.algebra.namespace import Number, apart, looped, recurring
 from trunnion.algebra.nested import replaced
 from trunnion.joints.contact_loads import ContactLoad, Reaction
 from trunnion.solve import continuation
+from trunnion.solve.continuation import largest
 from trunnion.solve.friction_method import FrictionMethod
 
 __all__ = [
-    "Contact", "FrictionMethod", "FrictionProblem", "Rubbing", "Settled", "frictionless", "largest", "scaled", "settle",
-    "with_own",
+    "Contact", "FrictionProblem", "Rubbing", "Settled", "frictionless", "scaled", "settle", "with_own",
 ]  # fmt: skip
 
 WEIGHTED, LIGHTEST = 6, 1e-3  # norms that are tried; least weight, of the largest row sum
@@ -244,11 +244,6 @@ class FrictionProblem:
             sums = [weighted(row, weights) for row in rows]
             bound = np.minimum(bound, largest([a / b for a, b in zip(sums, weights, strict=True)]))
         return np.where(plain >= 1.0, bound, plain)
-
-
-def largest(values: Sequence[Number]) -> Number:
-    """Largest magnitude, elementwise; NaN if one is NaN."""
-    return functools.reduce(np.maximum, [np.abs(primal(value)) for value in values])
 
 
 # ---- their solution -----------------------------------------------------------------------------------------------

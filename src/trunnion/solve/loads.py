@@ -261,20 +261,17 @@ def springs(walk: Forward) -> Iterator[tuple[str, LoadAction, SpringState]]:
         joint = spring.joint or ""
         turns = walk.system.turns(joint)
         speed = walk.rates(joint)[0 if turns else 1]
-        state = spring_state(walk, path, _elongation(walk, path, joint, turns), speed, spring.only)
+        free = walk.values.get(f"{path}.{'free_angle' if turns else 'free_length'}", 0.0)
+        if not turns:
+            elongation = walk.coordinates(joint)[1] - free
+        elif joint in walk.system.mechanism.drivers:  # whole turns count
+            elongation = walk.system.drive(walk.values, joint, walk.time)[0] - free
+        else:  # the nearest is meant
+            angle = walk.coordinates(joint)[0] - free
+            xp = namespace(angle)
+            elongation = xp.arctan2(xp.sin(angle), xp.cos(angle))
+        state = spring_state(walk, path, elongation, speed, spring.only)
         yield name, _in_joint(walk, joint, -state.force, turns, speed), state
-
-
-def _elongation(walk: Forward, path: str, joint: str, turns: bool) -> Number:
-    """Turn or slide of a joint beyond the free one; whole turns count where it is driven, else the nearest is meant."""
-    if not turns:
-        return walk.coordinates(joint)[1] - walk.values.get(f"{path}.free_length", 0.0)
-    free = walk.values.get(f"{path}.free_angle", 0.0)
-    if joint in walk.system.mechanism.drivers:
-        return walk.system.drive(walk.values, joint, walk.time)[0] - free
-    angle = walk.coordinates(joint)[0] - free
-    xp = namespace(angle)
-    return xp.arctan2(xp.sin(angle), xp.cos(angle))
 
 
 def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> tuple[LoadAction, SpringState]:

@@ -16,14 +16,8 @@ from trunnion.algebra.namespace import Number
 from trunnion.joints.contact_loads import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, pass_on, unloaded
-from trunnion.solve.friction import (
-    Contact,
-    FrictionProblem,
-    frictionless,
-    largest,
-    scaled,
-    with_own,
-)
+from trunnion.solve.continuation import largest
+from trunnion.solve.friction import Contact, FrictionProblem, frictionless, scaled, with_own
 from trunnion.solve.system import Cycle
 
 __all__ = ["least_beside", "locking_margin", "margin_for_sure", "margin_in"]

@@ -222,10 +222,8 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
 def built(mechanism: Mechanism) -> System:
     """The mechanism decomposed; with what its drivers do that move other joints than their own."""
     outward = driven_at_outputs(mechanism)
-    return build(mechanism, None if outward is None else _inverse(mechanism, outward))
-
-
-def _inverse(mechanism: Mechanism, outward: Mechanism) -> Inverse:
+    if outward is None:
+        return build(mechanism)
     moves = {name: driver.moves for name, driver in mechanism.drivers.items() if driver.moves}
     try:
         run = prepare(outward)
@@ -233,7 +231,8 @@ def _inverse(mechanism: Mechanism, outward: Mechanism) -> Inverse:
         name, joint = next(iter(moves.items()))
         what = f"the mechanism is not moved by {joint}: {error.findings[0].what}"
         raise MechanismError(Finding(what, f"drivers.{name}.moves", error.findings[0].remedy)) from None
-    return Inverse(moves, run.system, run.values, run.cycle, run.chosen.assembly, run.chosen.findings)
+    inverse = Inverse(moves, run.system, run.values, run.cycle, run.chosen.assembly, run.chosen.findings)
+    return build(mechanism, inverse)
 
 
 def _comes_back(run: Run) -> bool:

@@ -259,11 +259,6 @@ class System:
         first, second = self.mechanism.coupled(name)
         return (second, first) if name in self.turned_round else (first, second)
 
-    def gear_numbers(self, values: Values, name: str) -> tuple[Number, Number]:
-        """Ratio and phase of a gear pair in the order of `gear_joints`."""
-        ratio, phase = self.ratio(values, name), values[f"gears.{name}.phase"]
-        return (1 / ratio, -phase / ratio) if name in self.turned_round else (ratio, phase)
-
     def ratio(self, values: Values, name: str) -> Number:
         """Ratio of a gear pair; of a rack or screw the slide for one radian, m."""
         gear, where = self.mechanism.gears[name], f"gears.{name}"
@@ -608,7 +603,9 @@ def driven_coordinates(
     for name in module.gears:
         first = system.gear_joints(name)[0]
         turned = system.drive(values, first, time)[0] if first in system.mechanism.drivers else 0.0
-        ratio, phase = system.gear_numbers(values, name)
+        ratio, phase = system.ratio(values, name), values[f"gears.{name}.phase"]
+        if name in system.turned_round:  # φ₁ = (φ₂ − φ₀)/i
+            ratio, phase = 1 / ratio, -phase / ratio
         q += [ratio, phase, turned]
         rate += [ratio, 0.0, 0.0]
         second += [ratio, 0.0, 0.0]

@@ -441,7 +441,8 @@ def _seat_courses(result: xr.Dataset) -> list[Chart]:
             places = lost.get(joint, np.empty(0, int))
             if np.isfinite(values[places]).any():
                 crosses = Look("limit", dash="none", mark="x", size=6.0, order=4.0)
-                marks.append(Line(over.values[places], values[places], "contact lost", crosses))
+                named = any(mark.look == crosses for mark in marks if isinstance(mark, Line))
+                marks.append(Line(over.values[places], values[places], None if named else "contact lost", crosses))
         if marks:
             axis = Axis(title, angles=kind != "guide", margin=0.12)
             charts.append(Chart(over, axis, [*silent(result, over), *marks], zero=True, legend=Legend(1)))

@@ -301,7 +301,7 @@ class Integration(ABC):
             if self.motion.several:
                 if self.places.limits:  # no force may be known beyond
                     numbers_asked[:n] = np.clip(numbers[:n], *self.ends)
-            else:
+            elif not self.resting:
                 numbers_asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
                     numbers_asked[n] = 0.0

@@ -534,7 +534,7 @@ def _states(result: xr.Dataset, over: Abscissa, named: bool) -> list[Mark]:
 # ---- all kinds ------------------------------------------------------------------------------------------------------
 
 
-def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
+def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
     """The mechanism at a position, with coupler curves, joints named.
 
     If the position is not told: in the plane a telling one, with ghosts; in space that of the largest reaction.
@@ -554,7 +554,7 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
 
 PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {
     "torque": torque, "speed": speed, "friction-power": friction_power, "reactions": reactions, "polar": polar,
-    "power": power, "mechanism": lambda result, ideal: mechanism(result), "motion": motion, "error": error,
+    "power": power, "mechanism": mechanism, "motion": motion, "error": error,
     "seat": seat, "beta": beta, "locking": locking, "measures": measures,
 }  # fmt: skip
 KINDS = PLOTS
@@ -584,7 +584,7 @@ def figure(
     check_kind(kind, PLOTS)
     index = None if at is None else position_at(result, at)
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
-    return mechanism(result, index) if kind == "mechanism" else PLOTS[kind](result, ideal)
+    return mechanism(result, ideal, index) if kind == "mechanism" else PLOTS[kind](result, ideal)
 
 
 def position_at(result: xr.Dataset, place: str | float) -> int:

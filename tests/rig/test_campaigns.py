@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from trunnion.rig.judge import Verdict
+from trunnion.rig.comparison import Verdict
 from trunnion.rig.modelled import RIPPLE, over_pulses
 from trunnion.rig.virtual.sensors import pulsed
 

@@ -14,8 +14,7 @@ import trunnion
 from rig_measurements import course, measured, rocker
 from trunnion import MechanismError, Status
 from trunnion.errors import Severity
-from trunnion.rig.comparison import CAUSES, VARIABLES, causes
-from trunnion.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
+from trunnion.rig.comparison import CAUSES, VARIABLES, Verdict, causes, expanded, independent, judge, uncertainty_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from trunnion.rig.judge import Verdict
+from trunnion.rig.comparison import Verdict
 from trunnion.rig.reading.read import read_measured
 from trunnion.views.compare import sensors
 

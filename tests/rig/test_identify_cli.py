@@ -89,8 +89,8 @@ def test_estimates_of_a_model_that_does_not_fit_are_not_written(  # type: ignore
 def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
     files = ["x.csv", "x.fit.csv", "x.residuals.csv", "x.nc", "x.json", "x.svg"]
     outs = [part for name in files for part in ("--out", name)]
-    status, text = call("--parameter", f"mu={FRICTION}", "--start", "mu=0.3", "--hold-out", "0.25", "--write",
-                        "found.yaml", "--report", "x.html", *outs)  # fmt: skip
+    status, text = call("--parameter", f"mu={FRICTION}", "--start", "mu=0.3", "--hold-out", "misalignment=25 deg",
+                        "--write", "found.yaml", "--report", "x.html", *outs)  # fmt: skip
     assert status == 0, text
     assert "mu │   0.3 │ 0.3" in text
     assert "held-out data" in text

@@ -17,8 +17,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, prefixed, with_uncertainty
-from trunnion.rig.comparison import CAUSES
-from trunnion.rig.judge import Verdict
+from trunnion.rig.comparison import CAUSES, Verdict
 from trunnion.rig.reading.measurement import Measurement, rms
 from trunnion.views import sweep
 from trunnion.views.axis import Abscissa, Array, names, over_turn

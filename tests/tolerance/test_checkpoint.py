@@ -217,7 +217,7 @@ def interrupt(_: int) -> None:
 def test_an_allocation_whose_samples_are_stopped_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     from trunnion.studies.allocation import allocate
 
-    monkeypatch.setattr(allocate, "tolerance", partial(allocate.tolerance, progress=interrupt))
+    monkeypatch.setattr(allocate, "sample", partial(allocate.sample, progress=interrupt))
     costs = {"l2": {"model": "power", "B": 1, "k": 1, "unit": "mm"}}
     with pytest.raises(KeyboardInterrupt):
         allocate.allocate(fourbar(measures=LIMITED, costs=costs), criterion="yield")

@@ -20,6 +20,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.statistics import intervals
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import (
     AllocationProblem,
@@ -41,7 +42,7 @@ from trunnion.studies.allocation.result import (
 from trunnion.studies.allocation.rows import Rows, rows_of
 from trunnion.studies.allocation.solve import solve, trade_off
 from trunnion.studies.tolerance.linear import ToleranceStudy
-from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, check_share, tolerance
+from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, check_share, sample, tolerance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -308,12 +309,10 @@ def _solved(request: AllocationRequest, prices: Mapping[str, Price], problem: Al
     def verify(tolerances: Array, number: int) -> SampledYield:
         pairs = zip(problem.contributions, tolerances.tolist(), strict=True)
         bought = {contribution.name: t for contribution, t in pairs if contribution.name in prices}
-        sampled = tolerance(
-            request.mechanism.with_tolerances(bought), request.measures, ["monte-carlo"], request.samples,
-            request.seed + FRESH * number, request.steps, request.at, friction_method=request.friction,
-            jobs=request.jobs,
-        )  # fmt: skip
-        return SampledYield(*(float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high")))
+        seed = request.seed + FRESH * number
+        job = request.studied(bought).sampling("monte-carlo", request.samples, seed, "auto", steps=1)
+        passed = np.all(sample(job, request.jobs)[0].passed, axis=0)
+        return SampledYield(float(np.mean(passed)), *map(float, intervals.share(np.sum(passed), len(passed))))
 
     return solve(problem, request.target, verify if request.samples else None, request.sure)
 

@@ -271,21 +271,11 @@ def _summary(allocated: Allocated, arrays: Mapping[str, Any], toleranced: xr.Dat
 
 def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Why there is no allocation; limits that are not kept on the mechanism itself; what the criterion leaves out."""
-    answer, criterion, inputs = allocated.answer, allocated.asked.criterion, allocated.study.inputs
+    answer, criterion = allocated.answer, allocated.asked.criterion
     yield from allocated.findings
     yield from answer.findings
     if not answer.found:
         return
-    for tolerance in inputs.tolerances:
-        joint, _, number = tolerance.path.removeprefix("joints.").partition(".")
-        path = f"joints.{joint}.clearance"
-        if path in allocated.prices and number in ("pin.clearance", "guide.clearance"):
-            lower, upper = 1e6 * tolerance.lower, 1e6 * tolerance.upper
-            what = f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {tolerance.path} stays as "
-            what += "stated, in addition to it, and the limits include it"
-            remedy = "remove this tolerance if the cost covers the largest clearance"
-            figures = {"number": tolerance.path, "lower_um": lower, "upper_um": upper}
-            yield Finding.note("allocation.play_tolerance", f"costs.{joint}.clearance", what, remedy, **figures)
     if criterion != "yield" and allocated.study.effects.correlated:
         what = f"the criterion {criterion} ignores the correlations"
         remedy = "use a yield, which includes them"

@@ -17,6 +17,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies import batch
 from trunnion.studies.tolerance.indices import indices
 from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
+from trunnion.studies.tolerance.sampling import Samples, Sampling
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +27,7 @@ from trunnion.studies.tolerance.findings import Outcome
 from trunnion.studies.tolerance.linear import study
 from trunnion.studies.tolerance.result import dataset
 
-__all__ = ["DEFAULT_METHODS", "Method", "check_share", "tolerance"]
+__all__ = ["DEFAULT_METHODS", "Method", "check_share", "sample", "tolerance"]
 
 Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
@@ -105,28 +106,38 @@ def tolerance(
         if engine == "auto" and job.engine != "numpy":
             what = f"the samples are computed by the engine {job.engine}"
             notes.append(Finding.note("samples.engine", "samples", what, engine=job.engine))
-        if jobs is None:
-            jobs = 1 if job.work < FEW and cluster is None else None
-
-        def tell(share: float) -> None:
-            if progress is not None:
-                progress(round(share * job.samples))
-
-        try:
-            parts, trouble = batch.run(
-                job, jobs=jobs, threads=job.engine == "compiled", cluster=cluster, checkpoint=checkpoint, progress=tell
-            )
-        except KeyboardInterrupt:
-            hint = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
-            raise KeyboardInterrupt(*hint) from None
-        drawn = job.joined(parts)
-        del parts  # as large as the samples
+        drawn, trouble = sample(job, jobs, cluster, checkpoint, progress)
         notes += trouble
     if "sobol" in methods:
         # each number is to have its own coordinates of the points
         plain = replace(prepared.sampling("quasi-monte-carlo", samples, seed, engine), rotation=None)
         shares = indices(plain.prepare(), samples, seed)
     return dataset(Outcome(prepared, steps, tuple(methods), worst, drawn, shares, target), [*prepared.notes, *notes])
+
+
+def sample(
+    job: Sampling,
+    jobs: int | None = None,
+    cluster: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[Samples, list[Finding]]:
+    """All samples of a run, and what there is to say of its checkpoint. jobs: one a core if not given and worth it."""
+    if jobs is None:
+        jobs = 1 if job.work < FEW and cluster is None else None
+
+    def tell(share: float) -> None:
+        if progress is not None:
+            progress(round(share * job.samples))
+
+    try:
+        parts, trouble = batch.run(
+            job, jobs=jobs, threads=job.engine == "compiled", cluster=cluster, checkpoint=checkpoint, progress=tell
+        )
+    except KeyboardInterrupt:
+        hint = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
+        raise KeyboardInterrupt(*hint) from None
+    return job.joined(parts), trouble
 
 
 def _check(methods: Sequence[str], samples: int, seed: int, target: float | None) -> None:

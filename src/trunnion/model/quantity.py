@@ -69,6 +69,12 @@ class Quantity:
         return self.expression.names if self.expression else ()
 
     @property
+    def unit(self) -> str:
+        """Its unit, if it is written as one number with a unit, be it with limits."""
+        literal = self.expression.literal if self.expression else None
+        return literal.unit if literal else ""
+
+    @property
     def alone(self) -> float | str:
         """It as written, without the limits that stand with it."""
         return _split(normalise(self.source), self.kind)[0].strip() if isinstance(self.source, str) else self.source

@@ -15,12 +15,11 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import Any
 
-from trunnion.model.units import UnitError, si_unit, unit
+from trunnion.model.units import si_unit, unit
 
 __all__ = ["ScreenUnits", "follow", "in_use", "shown_as", "stated_by", "stated_units"]
 
 ScreenUnits = Mapping[str, tuple[float, str]]  # SI unit → factor and unit in which a number of it is shown
-STATED = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-zµ°][^±(]*?)\s*(?:[±+(-].*)?")  # "60 mm ± 0.05 mm"
 ANGLES = {"rad": "deg"}  # where no angle is stated; nobody reads radians
 LENGTHS = {**dict.fromkeys(("ft", "foot", "feet"), "ft"), **dict.fromkeys(("in", "inch", "inches"), "in"), "yd": "ft"}
 POUNDS = re.compile(r"\b(lbf|ozf|kip|lbs?|oz|slug|psi|ksi|hp)\b")
@@ -31,25 +30,13 @@ _IN_USE: ContextVar[ScreenUnits] = ContextVar("units in use", default=_NONE)
 def stated_units(mechanism: Any) -> dict[str, str]:
     """The unit that a mechanism states most often, for each unit of SI: {"m": "mm", "rad": "deg"}."""
     if "stated_units" not in mechanism.worked_out:
-        mechanism.worked_out["stated_units"] = _stated_units(mechanism)
+        entries = [entry for entry in mechanism.parameter_set.entries.values() if not entry.alias]
+        stated = [entry.quantity.unit for entry in entries if entry.quantity.unit[:1] not in ("", "1", "%", "‰")]
+        units: dict[str, str] = {}
+        for text, _ in Counter(stated).most_common():
+            units.setdefault(si_unit(unit(text)[1]), text)
+        mechanism.worked_out["stated_units"] = {si: text for si, text in (ANGLES | units).items() if si != text}
     return dict(mechanism.worked_out["stated_units"])
-
-
-def _stated_units(mechanism: Any) -> dict[str, str]:
-    counts: Counter[tuple[str, str]] = Counter()
-    for entry in mechanism.parameter_set.entries.values():
-        text = str(entry.quantity.source)
-        match = STATED.fullmatch(text)
-        if entry.alias or not match:
-            continue
-        try:
-            counts[si_unit(unit(match[1])[1]), match[1]] += 1
-        except UnitError:  # of a formula: "2 e", "40 N * x"
-            continue
-    units: dict[str, str] = {}
-    for (si, unit_text), _ in counts.most_common():
-        units.setdefault(si, unit_text)
-    return {si: unit_text for si, unit_text in (ANGLES | units).items() if si != unit_text}
 
 
 def _customary(units_stated: Mapping[str, str]) -> ScreenUnits:

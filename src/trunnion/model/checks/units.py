@@ -61,16 +61,11 @@ def _is_length(name: str, quantity: Quantity) -> bool:
     return False
 
 
-def _literal_unit(quantity: Quantity) -> str:
-    literal = quantity.expression.literal if quantity.expression else None
-    return literal.unit if literal else ""
-
-
 def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Finding]:
     """A warning of a number without a unit, for one that the model states with a unit, if it is nearer to that number
     as it is written than to its value in SI."""
     entry, before = numbers.entries.get(path), float(numbers.nominal.get(path, math.nan))
-    own_unit = _literal_unit(entry.quantity) if entry else ""
+    own_unit = entry.quantity.unit if entry else ""
     if not own_unit or not abs(value * before) > 0:
         return
     written = before / float(unit(own_unit)[0])
@@ -106,7 +101,7 @@ def plain_angles(mechanism: Varying, entries: Iterable[tuple[Entry, Sayable]]) -
             if math.isfinite(value) and abs(value) > abs(largest.get(rows, ("", 0.0))[1]):
                 largest[rows] = (where, value, f"takes {value:g} for" if expression and not of_dimension else "is")
     stated = (entry.quantity for entry in mechanism.entries if entry.quantity is not USUAL_PRESSURE_ANGLE)
-    with_units = any(_literal_unit(quantity) for quantity in stated)
+    with_units = any(quantity.unit for quantity in stated)
     for where, value, verb in largest.values():
         finding = in_radians(where, value, verb)
         if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):

@@ -193,10 +193,15 @@ Statistic = Literal[
 STATISTICS: tuple[str, ...] = Statistic.__args__  # type: ignore[attr-defined]
 
 
+def _described(description: str, alias: str | None = None) -> Any:
+    """A field that need not be stated."""
+    return Field(default=None, alias=alias, description=description)
+
+
 def _key(kind: MeasureKind) -> Any:
     """The field of a kind: a name, or one of its words."""
     words: Any = str if isinstance(kind.of, str) else Literal[kind.of]
-    return words | None, Field(default=None, description=kind.text)
+    return words | None, _described(kind.text)
 
 
 if TYPE_CHECKING:
@@ -212,53 +217,37 @@ class Measure(_Subject):
     every position. `limit` is of its deviation from nominal, `at_least` and `at_most` are of the number itself.
     """
 
-    axis: Literal["x", "y", "z"] | None = Field(
-        default=None,
-        description=(
-            "which coordinate of a point, or component of a velocity, an acceleration or a reaction; of an angle in "
-            "space, the global axis that the link turns about"
-        ),
+    axis: Literal["x", "y", "z"] | None = _described(
+        "which coordinate of a point, or component of a velocity, an acceleration or a reaction; of an angle in "
+        "space, the global axis that the link turns about"
     )
-    along: Annotated[Direction | None, InSpace()] = Field(
-        default=None, description="direction of the component, global axes, any length; instead of `axis`"
+    along: Annotated[Direction | None, InSpace()] = _described(
+        "direction of the component, global axes, any length; instead of `axis`"
     )
-    at: AnyQuantity | None = Field(
-        default=None,
-        description=(
-            "position: a coordinate of the first driver or a time; if neither this nor `as` is given, at every position"
-        ),
+    at: AnyQuantity | None = _described(
+        "position: a coordinate of the first driver or a time; if neither this nor `as` is given, at every position"
     )
-    statistic: Statistic | None = Field(
-        default=None,
+    statistic: Statistic | None = _described(
+        "statistic over the range; `largest` is the largest magnitude, `dwell` the share of "
+        "the time that it is `within` a band. If not given, that of the subject itself (stroke, dead_centre, ...), "
+        "else the largest deviation from nominal",
         alias="as",
-        description=(
-            "statistic over the range; `largest` is the largest magnitude, `dwell` the share of "
-            "the time that it is `within` a band. If not given, that of the subject itself (stroke, dead_centre, ...), "
-            "else the largest deviation from nominal"
-        ),
     )
-    within: tuple[AnyQuantity, AnyQuantity] | None = Field(
-        default=None, description="the band of `as: dwell`, from its lower to its upper end"
+    within: tuple[AnyQuantity, AnyQuantity] | None = _described(
+        "the band of `as: dwell`, from its lower to its upper end"
     )
-    over: tuple[AnyQuantity, AnyQuantity] | None = Field(
-        default=None,
-        description="the range of it, two coordinates of the first driver or two times; the whole motion if not given",
+    over: tuple[AnyQuantity, AnyQuantity] | None = _described(
+        "the range of it, two coordinates of the first driver or two times; the whole motion if not given"
     )
-    duration: Annotated[AnyQuantity | None, Positive] = Field(
-        default=None,
-        description=(
-            "of a measure of a motion in time: how long it is followed from its start; ten cycles if not given"
-        ),
+    duration: Annotated[AnyQuantity | None, Positive] = _described(
+        "of a measure of a motion in time: how long it is followed from its start; ten cycles if not given"
     )
-    limit: LimitText | None = Field(
-        default=None,
-        description=(
-            "allowed deviation from nominal, to either side or as +0.2/-0.1 deg: `tolerance` gives the yield, "
-            "`play` the positions at which the worst case exceeds it"
-        ),
+    limit: LimitText | None = _described(
+        "allowed deviation from nominal, to either side or as +0.2/-0.1 deg: `tolerance` gives the yield, "
+        "`play` the positions at which the worst case exceeds it"
     )
-    at_least: AnyQuantity | None = Field(default=None, description="least that it may be itself")
-    at_most: AnyQuantity | None = Field(default=None, description="most that it may be itself")
+    at_least: AnyQuantity | None = _described("least that it may be itself")
+    at_most: AnyQuantity | None = _described("most that it may be itself")
 
     @model_validator(mode="before")
     @classmethod

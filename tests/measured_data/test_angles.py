@@ -164,17 +164,6 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
         read(clean, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 
 
-def test_a_setting_in_turns_a_minute_states_its_unit(clean: Columns, tmp_path: Path) -> None:
-    """It may be any number of the model, for which 1/min may count turns or radians."""
-    columns = {**clean, "n [1/min]": np.full(clean["t"].size, 600.0)}
-    (one,) = read(columns, tmp_path, {"set": {"input.speed": {"column": "n", "unit": "rpm"}}}).conditions
-    assert one.values["input.speed"] == pytest.approx(20 * np.pi)
-    with pytest.raises(
-        MechanismError, match=r"'1/min', which may count turns or radians — state set\.input\.speed\.unit"
-    ):
-        read(columns, tmp_path, {"set": {"input.speed": {"column": "n"}}})
-
-
 @pytest.mark.sample(6)
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("wrap", [50, 60, 61, 100, 250, 256, 300, 360])

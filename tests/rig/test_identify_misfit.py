@@ -59,7 +59,7 @@ def test_a_misfit_is_told_and_compare_explains_it(folder: Path, name: str) -> No
     assert result["reduced_chi_squared"] > 1.5
     found = next(one for one in result.trunnion.findings if one.code == "fit.misfit")
     if found.severity is Severity.ERROR:
-        assert estimates(result)[0].cells()[:2] == ("model does not fit", "—")  # not a narrow interval elsewhere
+        assert estimates(result)[0].cells()[:2] == ["model does not fit", "—"]  # not a narrow interval elsewhere
     compared = trunnion.rig.compare(trunnion.read(MODEL), trunnion.rig.read(folder / "changed.yaml")).sel(channel="M")
     assert compared[f"{kind}_error"].values == pytest.approx(size, abs=near)
     assert np.all(compared[f"{kind}_explains"].values > 0.95)

@@ -119,9 +119,6 @@ def unit_of(where: str, name: str, column: Column, in_mapping: str | None, usual
     except UnitError as error:
         remedy = f"state {where}.unit in the mapping; in the file, {error.remedy}"
         raise MechanismError(Finding(f"the column '{name}': {error.what}", where, remedy)) from None
-    if kind == HERTZ and not (usual or in_mapping):  # of a setting, which may be any number of the model
-        what = f"the column '{name}' is in '{unit}', which may count turns or radians"
-        raise MechanismError(Finding(what, where, f"state {where}.unit, as rpm or rad/s"))
     if where in ("time", "angle") and not alike(kind, dimensions(usual)[1]):
         what = f"the column '{name}' has the unit '{unit}', which is no {where}"
         raise MechanismError(Finding(what, where, "name another column"))

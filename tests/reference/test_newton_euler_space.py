@@ -1,7 +1,7 @@
 """Spatial mechanisms against the Newton–Euler equations of all links at once, which share nothing with Trunnion.
 
 The oracle has its own motion, in maximal coordinates; from Trunnion it takes only the frames of the links, which tell
-its Newton the assembly, and finds friction by its own law.
+its Newton the assembly, and finds friction by its own law. MuJoCo has a motion and forces of its own.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import trunnion
 from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
 from reference.maximal_space import Array, Data, Drive, Frame, Motion, carried, unrolled
+from reference.mujoco_space import Engine, quaternion
 from reference.newton_euler_space import Solution
 from reference.space_oracle import Oracle
 
@@ -183,3 +184,38 @@ def test_forces_with_friction_by_its_law(name: str) -> None:
         scale = max(float(np.linalg.norm(load)) for load in friction.values())
         for joint, given in compared.friction(i, motions).items():
             np.testing.assert_allclose(given, friction[joint], rtol=0, atol=1e-8 * scale, err_msg=joint)
+
+
+IN_MUJOCO = [
+    "RSSR of the theory",
+    "Cardan joint of Pezzuti",
+    "Cardan joint at 45 degrees under gravity",
+    *("RSSP", "RCCC", "RRRSR", "RSUR", "PSUR", "CRSR", "RCSC, two drivers", "RRRRRRR"),
+]
+
+
+@pytest.mark.spread(1)
+@pytest.mark.parametrize("name", IN_MUJOCO)
+def test_agrees_with_mujoco(name: str) -> None:
+    """Motion and forces to 1e-11 of the largest of their kind."""
+    compared, data = comparison(name, False), stated(name, False)
+    engine = Engine(unrolled(data) if "loop" in data else data)
+    for i in compared.positions:
+        frames = {link: compared.frame(link, i) for link in engine.oracle.moving}
+        motions = engine.move(frames, compared.drive(i))
+        pace = max(1.0, *(float(np.max(np.abs(motion.spin))) for motion in motions.values()))
+        for link, motion in motions.items():
+            centre, _ = engine.oracle.centre(link, motion)
+            c = np.asarray(engine.links[link]["centre"], float)
+            w, second = (compared.array(f"link_angular_{what}", i, link=link) for what in ("velocity", "acceleration"))
+            np.testing.assert_allclose(frames[link].place + frames[link].axes @ c, centre, rtol=0, atol=1e-11)
+            np.testing.assert_allclose(w, motion.spin, rtol=0, atol=1e-11 * pace)
+            np.testing.assert_allclose(second, motion.spin_rate, rtol=0, atol=1e-10 * pace**2)
+            if link not in engine.oracle.free:
+                turn = quaternion(frames[link].axes @ motion.frame.axes.T)
+                assert abs(abs(turn[0]) - 1) < 1e-12
+        forces = engine.forces()
+        reactions = {joint: force for joint, (force, _) in forces.reactions.items()}
+        moments = {joint: moment for joint, (_, moment) in forces.reactions.items()}
+        couple = compared.forces_agree(i, Solution(reactions, moments, forces.efforts, forces.spins, 0.0), 1e-11)
+        assert all(abs(moment) < 1e-11 * couple for moment in forces.spins.values())

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
@@ -17,16 +18,20 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.rig.reading.timebase import gathered
+from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.system import sticking
 
 __all__ = [
     "Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "refuse_unit", "same_cycle",
+    "turned",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 FAR = 0.05  # of a speed: an error of the settings
 RIPPLE = 0.3  # of what pulses take of a speed, by where they come: 8/√720, the rest of a parabola over a straight line
+STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
 SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
 
 
@@ -35,8 +40,8 @@ class Modelled:
     """What the model has at the positions of a condition, SI.
 
     drive: coordinate of the first driver if it runs one way, else time; unit: rad, m or s; span: what `drive` gains
-    over the cycle; status: (position,); courses: by channel, NaN where the status rules one out; left_open: standard
-    uncertainty of a speed of pulses, by where these come.
+    over the cycle; status: (position,); turned: (position,), see the function; courses: by channel, NaN where
+    the status rules one out; left_open: standard uncertainty of a speed of pulses, by where these come.
     """
 
     run: Run
@@ -44,6 +49,7 @@ class Modelled:
     unit: str
     span: float
     status: NDArray[np.int8]
+    turned: NDArray[np.bool_]
     courses: Mapping[str, Array]
     measures: Mapping[str, Measure]
     left_open: Mapping[str, Array]
@@ -56,11 +62,14 @@ class Modelled:
     def comparable(self, channel: str) -> NDArray[np.bool_]:
         """Positions at which the model has one number for a channel.
 
-        A force is an interval where a relative speed is zero, and as a speed no number to rely on beside a dead centre.
+        A force is an interval where a relative speed is zero, jumps between the positions beside, and is like a speed
+        no number to rely on beside a dead centre.
         """
         finite, solved = np.isfinite(self.courses[channel]), self.status == Status.SOLVED
         if self.measures[channel].of_places:
             return finite
+        if not self.measures[channel].of_motion:
+            finite &= ~self.turned
         return finite & (solved if np.any(solved) else self.status < Status.CONTACT_LOST)
 
 
@@ -130,7 +139,23 @@ def modelled(
         elif measured.per_turn and run.cycle.periodic:
             courses[channel] = over_pulses(course, phase, duration, measured.per_turn)
             left_open[channel] = RIPPLE * np.abs(course - courses[channel])
-    return Modelled(run, drive, unit, float(last - first), status, courses, measures, left_open)
+    moving = forward(run.system, run.values, run.chosen.assembly, time)
+    sides = turned(run, moving, time.shape)
+    return Modelled(run, drive, unit, float(last - first), status, sides, courses, measures, left_open)
+
+
+def turned(run: Run, walk: Forward, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
+    sides = np.zeros(shape, bool)
+    for joint in sticking(run.system):
+        speed = np.broadcast_to(np.asarray(primal(walk.speed(joint)), float), shape)
+        most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
+        sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
+        differs = sign != np.roll(sign, -1, axis=-1)
+        if not run.cycle.periodic:
+            differs[..., -1] = False
+        sides |= differs | np.roll(differs, 1, axis=-1)
+    return sides
 
 
 def over_pulses(speed: Array, phase: Array, duration: float, per_turn: int) -> Array:

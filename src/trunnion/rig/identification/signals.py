@@ -21,21 +21,19 @@ from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
 from trunnion.model.rules import Within
+from trunnion.rig.modelled import turned
 from trunnion.solve import shifts
-from trunnion.solve.backward import Backward
 from trunnion.solve.forward import posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
-from trunnion.solve.system import sticking
 
 __all__ = ["Course", "Courses", "DriveCycle", "Model", "Parameters", "Unknown", "limits", "paths_of", "unknowns"]
 
 Array = NDArray[np.float64]
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
 AT_ONCE = 20_000  # numbers in an array
-STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
 STEP = 1e-6  # of a number, for what it does to the duration of the cycle
 SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
 
@@ -119,13 +117,13 @@ class Model:
             most = max(1, AT_ONCE // (size * many))
             for part in (alike[low : low + most] for low in range(0, len(alike), most)):
                 shape = (len(part) * many, size)
-                courses, status, turned = self._batch(part, at, shape)
+                courses, status, sides = self._batch(part, at, shape)
                 parts = {name: [np.broadcast_to(np.asarray(of(signal), float), shape) for of in (primal, derivative)]
                          for name, signal in courses.items()}  # fmt: skip
                 for i, k in enumerate(part):
                     lanes = slice(i * many, (i + 1) * many)
                     by_channel = {name: Course(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
-                    rows[k] = by_channel, np.max(status[lanes], axis=0), np.any(turned[lanes], axis=0)
+                    rows[k] = by_channel, np.max(status[lanes], axis=0), np.any(sides[lanes], axis=0)
         return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
 
     def _batch(
@@ -140,20 +138,7 @@ class Model:
                 return courses, pose_status(walk, shape), np.zeros(shape, bool)
             back = self.run.solve(time, values, self.friction)
             courses = {name: measure.curve(back)[0] for name, measure in self.measures.items()}
-            return courses, status_of(back, shape), self._turned(back, shape)
-
-    def _turned(self, back: Backward, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
-        turned = np.zeros(shape, bool)
-        for joint in sticking(self.run.system):
-            speed = np.broadcast_to(np.asarray(primal(back.walk.speed(joint)), float), shape)
-            most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
-            sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
-            differs = sign != np.roll(sign, -1, axis=-1)
-            if not self.run.cycle.periodic:
-                differs[..., -1] = False
-            turned |= differs | np.roll(differs, 1, axis=-1)
-        return turned
+            return courses, status_of(back, shape), turned(self.run, back.walk, shape)
 
     def by_share(self, condition: int, row: Array) -> Array:
         """Derivative by the share of the cycle of courses in a condition, (…, position), by differences of neighbours.

@@ -164,7 +164,7 @@ def test_json_and_toml_that_are_no_model(
 def test_paths_that_are_no_file(tmp_path: Path) -> None:
     for path, what in (
         (tmp_path / "missing.yaml", "cannot be read: No such file or directory"),
-        (tmp_path / "model.txt", "the extension '.txt' is not one of a model file"),
+        (tmp_path / "model.txt", "the extension '.txt' is not one of YAML, JSON or TOML"),
         (tmp_path / "model", "the extension '' is not one"),
     ):
         with pytest.raises(MechanismError) as error:

@@ -149,7 +149,7 @@ def version_findings(data: Mapping[str, Any]) -> list[Finding]:
 def _file_type(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in _TYPES:
-        what, remedy = f"the extension '{suffix}' is not one of a model file", f"use {', '.join(_TYPES)}"
+        what, remedy = f"the extension '{suffix}' is not one of YAML, JSON or TOML", f"use {', '.join(_TYPES)}"
         raise MechanismError(Finding(what, file=str(path), remedy=remedy))
     return _TYPES[suffix]
 

@@ -177,7 +177,7 @@ def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: MeasureOrder)
     parts += [f"allowed {' to '.join(ends)}"] if ends else []
     if measure.at_least is not None or measure.at_most is not None:
         bounds = {"at least": measure.at_least, "at most": measure.at_most, "nominal": nominal}
-        parts += [f"{word} {signed(end, factor, unit, '')}" for word, end in bounds.items() if end is not None]
+        parts += [f"{word} {signed(end, factor, unit, '', 7)}" for word, end in bounds.items() if end is not None]
     what, where = f"limits not met: {'; '.join(parts)}", f"measures.{measure.name}"
     return Finding.error("limit.missed", where, what, _remedy(outcome, of), **figures)
 

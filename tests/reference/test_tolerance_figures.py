@@ -142,7 +142,7 @@ def made(**limits: Any) -> dict[str, Any]:
         ({"limit": "±0.5 deg"}, ["linear", "worst-case", "monte-carlo"], ()),
         ({"limit": "±0.1 deg"}, ["linear", "worst-case"], ("worst case",)),
         ({"limit": "±0.05 deg"}, ["linear", "worst-case", "monte-carlo"], ("worst case", "yield", "Cpk")),
-        ({"at_most": NOMINAL + 1e-3}, ["linear"], ("worst case", "at most")),
+        ({"at_most": NOMINAL + 1e-3}, ["linear"], ("worst case", f"at most {np.degrees(NOMINAL + 1e-3):.7g}°")),
         ({"at_least": NOMINAL - 1e-2, "at_most": NOMINAL + 1e-2}, ["linear", "monte-carlo"], ()),
     ],
 )

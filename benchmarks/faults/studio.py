@@ -10,15 +10,15 @@ FAULTS = (
     Fault(
         "dragged-link-turned-the-other-way",
         "studio/sketch.py",
-        "frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)",
-        "frame = Frame(x, y, sign * (a - x) / length, -sign * (b - y) / length)",
+        "direction = places[ahead] - places[origin]",
+        "direction = (places[ahead] - places[origin]).conjugate()",
         ("tests/studio/test_answers.py", "-k", "three_joints"),
     ),
     Fault(
         "guide-that-does-not-follow-its-block",
         "studio/sketch.py",
-        "yield from self._at(first, joint, (base[0] - across * y / norm, base[1] + across * x / norm))",
-        "yield from self._at(first, joint, base)",
+        "base = self.local(first, joint) + 1j * axis * across",
+        "base = self.local(first, joint)",
         ("tests/studio/test_answers.py", "-k", "guide"),
     ),
     Fault(

@@ -13,13 +13,13 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.cycle.locks import locks_of, margins_without
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
@@ -31,27 +31,13 @@ from trunnion.results.dataset import Column
 from trunnion.results.scales import without_noise
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.run import prepare
-from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
-from trunnion.studio.changing import add_row, delete, put_value, rename
-from trunnion.studio.findings import (
-    cures,
-    figures,
-    margin_of,
-    missing,
-    reached,
-    readiness,
-    remedied,
-    sentence,
-    spoken,
-)  # fmt: skip
+from trunnion.studio import changing, drawing
+from trunnion.studio.findings import cures, figures, margin_of, missing, reached, readiness, remedied, sentence, spoken
 from trunnion.studio.layers import centres_of, corner_of, measured, seats_of, transmission_of
-from trunnion.studio.live import Live, live_in_space, places_at, uncollected
+from trunnion.studio.live import Live, live_in_space, places_at, thumbnail, tracks, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded, columns_of
 from trunnion.studio.message import packed
-from trunnion.studio.placed import plain, thumbnail, tracks
-from trunnion.studio.selected_links import group
-from trunnion.studio.sketch import Sketch, Vector
-from trunnion.studio.strokes import add_point, held, join, link, move, pinned, slide, vector
+from trunnion.studio.sketch import Sketch
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
 from trunnion.views.bodies import gathered
@@ -61,8 +47,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["ANSWERS", "answer"]
-
-Array = NDArray[np.float64]
 
 MOST_OTHERS = 3  # assemblies
 FILES = {"csv": ("csv", "text/csv"), "report": ("html", "text/html"), "png": ("png", "image/png"),
@@ -113,11 +97,9 @@ def _examples() -> dict[str, str]:
     shipped = files("trunnion") / "examples"
     if not shipped.is_dir():  # a working tree
         shipped = files("trunnion") / ".." / ".." / "examples"
-    texts = {
-        path.name[:-5]: path.read_text(encoding="utf-8") for path in shipped.iterdir() if path.name.endswith(".yaml")
-    }
-    alone = {name: text for name, text in texts.items() if "\nlinks:" in text or "\nloop:" in text}
-    return dict(sorted(alone.items()))
+    paths = sorted((path for path in shipped.iterdir() if path.name.endswith(".yaml")), key=lambda path: path.name)
+    texts = {path.name[:-5]: path.read_text(encoding="utf-8") for path in paths}
+    return {name: text for name, text in texts.items() if "\nlinks:" in text or "\nloop:" in text}
 
 
 def _example(question: Asked) -> dict[str, Any]:
@@ -140,8 +122,8 @@ def _model(question: Asked) -> dict[str, Any]:
     with suppress(MechanismError):  # of what is half drawn those that can be read
         numbers = state.mechanism.parameters() if state.mechanism else _sketch(question).numbers
     head = answer_so_far | {
-        "entries": state.entries, "numbers": plain(numbers), "solved": result is not None, "bare": state.bare,
-        "scene": None,
+        "numbers": {path: float(np.ravel(primal(value))[0]) for path, value in numbers.items()},
+        "entries": state.entries, "solved": result is not None, "bare": state.bare, "scene": None,
     }  # fmt: skip
     if result is None:
         return head
@@ -158,7 +140,7 @@ def _model(question: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
+def _sketch(question: Asked, places: dict[str, complex] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
     entries = copy.deepcopy(dict(question.state.entries or {}))
     return Sketch(entries, places or {}, fine=float(question.get("fine") or 0.0))
@@ -209,38 +191,27 @@ def _row(state: Loaded, finding: Finding, result: xr.Dataset | None) -> dict[str
 # ---- dragging -----------------------------------------------------------------------------------------------------
 
 
-class _Still(Sketch):
-    """A drawing that is asked many times a second and not changed."""
-
-    @cached_property
-    def joints(self) -> Mapping[str, Any]:
-        """See `Sketch.joints`."""
-        return super().joints
-
-
 @uncollected()
 def _drag(question: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged `to` a place, a pin on the ground with `keep` by its links; in space
     `by` metres along the axes.
     """
+    point, index = str(question["point"]), question.index
+    numbers, fine = question.state.run.system.mechanism.parameter_set.nominal, float(question.get("fine") or 0.0)
+    sketch = Sketch(dict(question.state.entries or {}), fine=fine)
+    sketch.numbers = numbers
     if question.get("by") is not None:
-        sketch, by = _sketch(question), [float(part) for part in question["by"]]
-        sketch.numbers = question.state.run.system.mechanism.parameter_set.nominal
-        shifts = sketch.shifted(str(question["point"]), by, _turns(question.state, question.index))
-        return _live(question, {change.path: change.value for change in shifts}, question.index)
-    index, to, point = question.index, vector(question["to"]), str(question["point"])
-    fine = float(question.get("fine") or 0.0)
-    sketch = _Still(dict(question.state.entries or {}), places_at(question), fine=fine)
-    sketch.numbers = question.state.run.system.mechanism.parameter_set.nominal
-    changes = {change.path: change for change in sketch.moved(point, to, bool(question.get("keep")))}  # a number once
-    values = {path: change.value for path, change in changes.items()}
+        by = [float(part) for part in question["by"]]
+        return _live(question, sketch.shifted(point, by, _turns(question.state, index)), index)
+    sketch.places, to = places_at(question), drawing.vector(question["to"])
+    values = sketch.moved(point, to, bool(question.get("keep")))
     live = Live(question.cycle.run, values, question.steps)
-    near = live.nearest(*held(sketch, point), to, index, 1e-6 * sketch.size)
+    near = live.nearest(*drawing.located(sketch, point), to, index, 1e-6 * sketch.size)
     rows = []
     for path, value in values.items():
         section, name, *inner = path.split(".")
         name = f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
-        rows.append([name, sketch.length(float(sketch.numbers[path])), sketch.length(value)])
+        rows.append([name, sketch.length(float(numbers[path])), sketch.length(value)])
     return {"changes": rows} | _live(question, values, near, live)
 
 
@@ -275,7 +246,7 @@ def _edit(question: Asked) -> dict[str, Any]:
     text, state = str(question["text"]), question.state
     if state.entries is None:
         raise MechanismError(state.findings)
-    places = {str(key): (float(x), float(y)) for key, (x, y) in dict(question.get("places") or {}).items()}
+    places = {str(key): complex(float(x), float(y)) for key, (x, y) in dict(question.get("places") or {}).items()}
     sketch = _sketch(question, places)
     if not text.strip():
         sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
@@ -287,16 +258,18 @@ def _edit(question: Asked) -> dict[str, Any]:
     points = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
     return {
         "text": changed,
-        "places": {key: list(place) for key, place in sketch.places.items() if key in points},
+        "places": {key: [place.real, place.imag] for key, place in sketch.places.items() if key in points},
         "says": ", ".join(says),
         "made": sketch.made,
     }
 
 
 GESTURES: dict[str, Callable[[Sketch, Mapping[str, Any]], str]] = {
-    "link": link, "pin": pinned, "join": join, "slide": slide, "add-point": add_point, "driver": driver, "load": load,
-    "spring": spring, "gear": gear, "block": block, "bar-mass": bar_mass, "centre": centre, "move": move,
-    "group": group, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
+    "link": drawing.link, "pin": drawing.pinned, "join": drawing.join, "slide": drawing.slide,
+    "add-point": drawing.add_point, "driver": drawing.driver, "load": drawing.load, "spring": drawing.spring,
+    "gear": drawing.gear, "block": block, "bar-mass": drawing.bar_mass, "centre": drawing.centre, "move": drawing.move,
+    "group": changing.group, "set": changing.put_value, "delete": changing.delete, "rename": changing.rename,
+    "add-row": changing.add_row,
 }  # fmt: skip
 
 
@@ -316,7 +289,7 @@ def _done(sketch: Sketch, request: Mapping[str, Any]) -> str:
     return words
 
 
-def _turns(state: Loaded, index: int) -> dict[str, Array]:
+def _turns(state: Loaded, index: int) -> dict[str, Any]:
     """Rotation of every moving link in space, (3, 3), at a position of the cycle; MechanismError where it has none."""
     poses = gathered(state.cycle(STEPS, True).motion).poses
     turns = {link: pose.matrix[:, :, index % STEPS] for link, pose in poses.items()}

@@ -16,8 +16,8 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
 from trunnion.studies.design import instant_centres, transmission_angles
+from trunnion.studio.live import column
 from trunnion.studio.message import Exact
-from trunnion.studio.placed import column
 from trunnion.views.as_built import seated
 from trunnion.views.scene import scene
 

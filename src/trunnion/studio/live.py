@@ -1,4 +1,5 @@
-"""A mechanism while the hand changes its numbers: motion, forces and locking margin, many times a second.
+"""Where the points of a mechanism are over its cycle; motion, forces and locking margin while the hand changes its
+numbers, many times a second; small pictures of the examples.
 
 What does not change from answer to answer, as the positions before the drag, is worked out once for a text. Of many
 joints the forces are those of the position that is shown: those of a whole cycle take longer than a hand waits.
@@ -7,15 +8,18 @@ joints the forces are those of the position that is shown: those of a whole cycl
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
+from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
+from trunnion.algebra.nested import flat
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
@@ -23,11 +27,9 @@ from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import status_of
 from trunnion.solve.system import Values, rubbing
-from trunnion.studio.loaded import Asked
-from trunnion.studio.placed import columns, tracked, tracks
-from trunnion.studio.sketch import Vector
+from trunnion.studio.loaded import Asked, Loaded, loaded
 
-__all__ = ["Live", "live_columns", "live_in_space", "places_at", "uncollected"]
+__all__ = ["Live", "column", "live_in_space", "places_at", "thumbnail", "tracks", "uncollected"]
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,9 @@ AT_ONCE = 12_000  # joints times positions whose forces are worked out in the ti
 MOST_TRACKED = 6_000  # places of all tracks that are drawn in it: the page writes each as text
 MOST_FOLLOWED = 16  # contacts whose friction is followed until they lock: the time grows with their cube
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
+SMALL_STEPS = 60  # of a small picture
+SHOWN = 8  # position of them that is drawn: at the start many mechanisms lie in line
+TURNED, TILTED = radians(35), radians(25)  # of its view of mechanisms in space, in which z is up
 
 
 @contextmanager
@@ -49,15 +54,60 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def places_at(question: Asked) -> dict[str, tuple[float, float]]:
+# ---- where points are -----------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=4)
+@np.errstate(all="ignore")
+def tracked(state: Loaded, steps: int) -> dict[str, dict[str, Array]]:
+    """Tracks of a model's points; MechanismError where its structure does not determine them."""
+    return tracks(state.run.posed(state.run.cycle.times(steps), state.run.values), steps)
+
+
+def column(number: Any, steps: int) -> Array:
+    """A number of a walk at every position."""
+    return np.broadcast_to(np.asarray(primal(number), float), (steps,))
+
+
+def columns(numbers: Sequence[Any], steps: int) -> Array:
+    """Numbers of a walk at every position, (number, position): a call for each takes longer than all of them."""
+    table = np.empty((len(numbers), steps))
+    for row, number in zip(table, numbers, strict=True):
+        row[:] = primal(number)
+    return table
+
+
+def tracks(walk: Forward, steps: int, points: Iterable[tuple[str, str]] | None = None) -> dict[str, dict[str, Array]]:
+    """Where points (link, name) are over the positions of a walk, m, by "link.name"; all if none are named."""
+    points = list(walk.system.points if points is None else points)
+    order = {link: k for k, link in enumerate(dict.fromkeys(link for link, _ in points))}
+    numbers = columns([number for link in order for number in flat(walk.frames[link])], steps)
+    frames = numbers.reshape(len(order), -1, steps).swapaxes(0, 1)
+    if walk.system.spatial:
+        axes, origin = frames[:9].reshape(3, 3, len(order), steps), frames[9:]
+    else:
+        x, y, c, s = frames
+        axes, origin = np.array([[c, s], [-s, c]]), np.array([x, y])
+    of = [order[link] for link, _ in points]
+    local = np.array([walk.local_place(link, name) for link, name in points], float).reshape(len(of), -1).T
+    places = origin[:, of] + sum(part[:, None] * axis[:, of] for part, axis in zip(local, axes, strict=True))
+    return {f"{link}.{name}": dict(zip(walk.system.axes, place, strict=True))
+            for (link, name), place in zip(points, places.swapaxes(0, 1), strict=True)}  # fmt: skip
+
+
+def places_at(question: Asked) -> dict[str, complex]:
     """Where the points of a model are at the position that is shown, m; MechanismError where it has no answer."""
-    _refuse_space(question.state.run)
+    if question.state.run.system.spatial:
+        raise MechanismError(Finding("is dragged in space by steps along its axes", remedy="state by how much"))
     paths, index = tracked(question.state, question.steps), question.index
-    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
+    places = {key: complex(track["x"][index], track["y"][index]) for key, track in paths.items()}
     if not np.all(np.isfinite(list(places.values()))):
         what = "cannot be assembled at the position that is shown"
         raise MechanismError(Finding(what, remedy="go to another position"))
     return places
+
+
+# ---- while numbers change -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +128,6 @@ class Live:
     values: Mapping[str, float]
     steps: int
     _backs: dict[int, Backward] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        _refuse_space(self.run)
 
     @cached_property
     def time(self) -> Array:
@@ -105,7 +152,7 @@ class Live:
         return self._backs[key]
 
     @np.errstate(all="ignore")
-    def nearest(self, link: str, point: str, to: Vector, index: int, slack: float) -> int:
+    def nearest(self, link: str, point: str, to: complex, index: int, slack: float) -> int:
         """Position at which a point of a link is nearest to a place, m: `index` unless another is nearer by `slack`."""
         far = _far(self.solved(index).walk, link, point, to)
         if len(far) < self.steps:
@@ -124,17 +171,38 @@ class Live:
         Returns
         -------
         dict
-            The columns of `live_columns`, of all positions or of the shown one alone; then with `tracks`, thinned, of
-            what moves. margin: the locking margin at the shown one, `value` None where it has none, and whether it is
-            `beyond` that.
+            Of all positions, or of the shown one alone with `tracks`, thinned, of what moves: points: x, y, m, of each
+            "link.point"; angles: of the links, rad; status: of the positions; efforts: of the drivers, N m or N;
+            joints: of each the reaction, x and y, N, friction_power, W, and friction along a slide, N. Forces are NaN
+            where a position is not solved. margin: the locking margin at the shown one, `value` None where it has none,
+            and whether it is `beyond` that.
         """
-        back, lanes = self.solved(index), np.arange(self.steps) == index
-        columns = live_columns(back, self.steps if self.few else 1)
-        status = columns["status"]
-        if not self.few:
-            columns["tracks"], lanes = self._tracks(), np.True_
-        here = status[index if self.few else 0]
-        return columns | {"margin": _margin(self.run, self.numbers, back, here, self.time[index], lanes)}
+        back, steps = self.solved(index), self.steps if self.few else 1
+        walk, system = back.walk, back.walk.system
+        status = status_of(back, (steps,))
+        numbers = {("", name): effort for name, effort in back.efforts.items()}
+        for name in system.joints:
+            numbers |= dict(zip(((name, "x"), (name, "y")), tuple(back.reactions[name])[:2], strict=True))
+            numbers[name, "friction_power"] = back.losses[name]
+            if not system.turns(name):
+                numbers[name, "friction"] = back.friction[name]
+        rows = columns(list(numbers.values()), steps)
+        rows[:, status >= Status.NOT_CONVERGED] = np.nan
+        joints: dict[str, dict[str, Array]] = {name: {} for name in ("", *system.joints)}
+        for (name, part), row in zip(numbers, rows, strict=True):
+            joints[name][part] = row
+        sines, cosines = (columns([getattr(frame, part) for frame in walk.frames.values()], steps) for part in "sc")
+        lanes = np.arange(self.steps) == index if self.few else np.True_
+        here = int(status[index if self.few else 0])
+        return {
+            "points": tracks(walk, steps),
+            "angles": dict(zip(walk.frames, np.arctan2(sines, cosines), strict=True)),
+            "status": [int(code) for code in status],
+            "efforts": joints.pop(""),
+            "joints": joints,
+            **({} if self.few else {"tracks": self._tracks()}),
+            "margin": _margin(self.run, self.numbers, back, here, self.time[index], lanes),
+        }
 
     def _tracks(self) -> dict[str, dict[str, Array]]:
         """Where each joint and each free point goes that moves, at as many positions as can be drawn in time."""
@@ -184,47 +252,44 @@ def _margin(run: Run, numbers: Values, back: Backward, status: int, time: float,
     return {"value": min(margin, NEAR), "beyond": many or margin > NEAR}
 
 
-def _refuse_space(run: Run) -> None:
-    if run.system.spatial:
-        raise MechanismError(Finding("is dragged in space by steps along its axes", remedy="state by how much"))
-
-
-@np.errstate(all="ignore")
-def live_columns(back: Backward, steps: int) -> dict[str, Any]:
-    """Return what the page draws and tells of a mechanism that is being changed.
-
-    Returns
-    -------
-    dict
-        points: x, y, m, of each "link.point"; angles: of the links, rad; status: of the positions; efforts: of the
-        drivers, N m or N; joints: of each the reaction, x and y, N, friction_power, W, and friction along a slide, N.
-        Forces are NaN where a position is not solved.
-    """
-    walk, system = back.walk, back.walk.system
-    status = status_of(back, (steps,))
-    numbers = {("", name): effort for name, effort in back.efforts.items()}
-    for name in system.joints:
-        numbers |= dict(zip(((name, "x"), (name, "y")), tuple(back.reactions[name])[:2], strict=True))
-        numbers[name, "friction_power"] = back.losses[name]
-        if not system.turns(name):
-            numbers[name, "friction"] = back.friction[name]
-    rows = columns(list(numbers.values()), steps)
-    rows[:, status >= Status.NOT_CONVERGED] = np.nan
-    joints: dict[str, dict[str, Array]] = {name: {} for name in ("", *system.joints)}
-    for (name, part), row in zip(numbers, rows, strict=True):
-        joints[name][part] = row
-    efforts = joints.pop("")
-    angles = np.arctan2(*(columns([getattr(frame, part) for frame in walk.frames.values()], steps) for part in "sc"))
-    return {
-        "points": tracks(walk, steps),
-        "angles": dict(zip(walk.frames, angles, strict=True)),
-        "status": [int(code) for code in status],
-        "efforts": efforts,
-        "joints": joints,
-    }
-
-
-def _far(walk: Forward, link: str, point: str, to: Vector) -> Array:
+def _far(walk: Forward, link: str, point: str, to: complex) -> Array:
     """Distance of a point of a link from a place at each position, m."""
     track = tracks(walk, len(walk.time), [(link, point)])[f"{link}.{point}"]
-    return np.hypot(track["x"] - to[0], track["y"] - to[1])
+    return np.hypot(track["x"] - to.real, track["y"] - to.imag)
+
+
+# ---- small pictures of the examples -----------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=128)
+def thumbnail(text: str) -> dict[str, Any]:
+    """Links with their points at one position, and paths, in a plane, m; none of a model not placed.
+
+    Of mechanisms in space a parallel projection.
+    """
+    state = loaded(text)
+    try:
+        places = {key: _projected(*track.values()) for key, track in tracked(state, SMALL_STEPS).items()}
+    except MechanismError:
+        places = {}
+    complete = np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0) if places else [False]
+    if not np.any(complete):
+        return {"links": [], "paths": []}
+    reached, ground = np.flatnonzero(complete), state.run.system.mechanism.fixed_link
+    index = reached[min(SHOWN, len(reached) - 1)]
+    links: dict[str, list[list[float]]] = {}
+    for key, track in places.items():
+        links.setdefault(key.rpartition(".")[0], []).append([float(part) for part in track[:, index]])
+    moved = [track[:, reached] for key, track in places.items() if key.rpartition(".")[0] != ground]
+    return {
+        "links": [{"ground": link == ground, "points": points} for link, points in links.items()],
+        "paths": [{"x": x, "y": y} for x, y in moved if np.ptp(x) + np.ptp(y) > 0],
+    }  # fmt: skip
+
+
+def _projected(x: Array, y: Array, z: Array | None = None) -> Array:
+    """A track as it is drawn, (2, position): in space seen from the side and from above."""
+    if z is None:
+        return np.array([x, y])
+    across, depth = cos(TURNED) * x + sin(TURNED) * y, cos(TURNED) * y - sin(TURNED) * x
+    return np.array([across, cos(TILTED) * z + sin(TILTED) * depth])

@@ -2,53 +2,52 @@
 
 from __future__ import annotations
 
+from cmath import phase, rect
 from collections.abc import Callable, Mapping
-from math import atan2, cos, degrees, hypot, sin
+from math import atan2, cos, degrees, sin
 from typing import Any
 
-from trunnion.studio.acting import driver, gear
-from trunnion.studio.sketch import Frame, Sketch, Vector
-from trunnion.studio.strokes import bar, begin, letter, line_near, numbered, place_of, point_of, refused, slide, typed
+from trunnion.studio.drawing import bar, driver, gear, letter, line_near, numbered, place_of, point_of, slide, typed
+from trunnion.studio.sketch import Frame, Sketch, refused
 
 __all__ = ["block"]
 
-Given = Mapping[str, Any]
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
-INNER, TURNED = 0.8, 1.4  # corners of a triad's plate: its pins, so near to its middle, turned so far about it, rad
-BEYOND = 1.5  # of the distance of its pins, how long the link of an RPR is
+CORNER = rect(0.8, 1.4)  # of a triad's plate: from its middle, in the direction of its pin, how near and how far turned
+LEVER = 1.5  # of the distance of its pins, how long the link of an RPR is
+SMALLEST = 0.04  # m: what the size of a drawing counts at least
 
 
-def block(sketch: Sketch, gesture: Given) -> str:
+def block(sketch: Sketch, gesture: Mapping[str, Any]) -> str:
     """A block of the list BLOCKS.
 
     pins: joints, free points "link.P", or {ground: "x, y"} for a new pin on the ground. at: "x, y" of the inner pin,
     of a driver or RPR the end of its link, of a CCC the angle between the shafts; as it fits if empty. ratio: of gears.
     """
-    kind = str(gesture["kind"])
-    if kind not in BLOCKS:
-        raise refused(f"'{kind}' is no block", "the block", f"choose {', '.join(BLOCKS)}")
-    begin(sketch)
-    if len(set(map(str, gesture["pins"]))) < len(gesture["pins"]):
+    kind, pins = str(gesture["kind"]), gesture["pins"]
+    if kind not in (*BLOCKS, "CCC", "gear"):
+        raise refused(f"'{kind}' is no block", "the block", f"choose {', '.join(BLOCKS)}, CCC, gear")
+    sketch.begin()
+    if len(set(map(str, pins))) < len(pins):
         raise refused("has the same pin twice", "the block", "choose other pins")
     if kind == "CCC":
         return _loop_in_space(sketch, gesture.get("at") or "30 deg")
     if kind == "gear":
-        if not all(isinstance(pin, str) for pin in gesture["pins"]):
+        if not all(isinstance(pin, str) for pin in pins):
             raise refused("need two pivots that are drawn", "the gears", "choose two pins")
-        return gear(sketch, {"joints": gesture["pins"], "ratio": gesture.get("ratio")})
-    pins = [pin if isinstance(pin, str) else {"ground": _place(sketch, pin["ground"])} for pin in gesture["pins"]]
+        return gear(sketch, {"joints": pins, "ratio": gesture.get("ratio")})
+    pins = [pin if isinstance(pin, str) else {"ground": _place(sketch, pin["ground"])} for pin in pins]
     BLOCKS[kind](sketch, pins, _place(sketch, gesture["at"]) if str(gesture.get("at") or "").strip() else None)
     return f"Add {kind if kind.isupper() else f'a {kind}'}"
 
 
-def _place(sketch: Sketch, text: Any) -> Vector:
+def _place(sketch: Sketch, text: Any) -> complex:
     """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in the unit of the sheet."""
     parts = str(text).replace(";", ",").split(",")
     if len(parts) != 2:
         what = f"'{str(text)[:40]}' is no place (two lengths are needed)"
         raise refused(what, "the block", "write two lengths, such as 120 mm, 40 mm")
-    x, y = (typed(part, "length", "the block", sketch.unit) for part in parts)
-    return x, y
+    return complex(*(typed(part, "length", "the block", sketch.unit) for part in parts))
 
 
 def _end(sketch: Sketch, name: str) -> str:
@@ -57,74 +56,72 @@ def _end(sketch: Sketch, name: str) -> str:
     return f"{name}.{point}"
 
 
-def _across(sketch: Sketch, pins: list[Any], share: float) -> Vector:
-    """A place left of the middle of two pins, by a share of their distance."""
-    (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
-    if not hypot(a - x, b - y) > 0:
-        raise refused("has its two pins on one spot", "the block", "choose two that are apart")
-    return (x + a) / 2 - share * (b - y), (y + b) / 2 + share * (a - x)
+# ---- what each block draws: at its pins, its inner pin or the end of its link `at` a place, or as it fits -----------
 
 
-def _crank(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
-    x, y = place_of(sketch, pins[0])
-    crank = bar(sketch, pins[0], list(at or (x, y + max(0.3 * sketch.size, 0.04))))
+def _crank(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
+    usual = place_of(sketch, pins[0]) + 1j * max(0.3 * sketch.size, SMALLEST)
+    crank = bar(sketch, pins[0], usual if at is None else at)
     driver(sketch, {"joint": next(iter(sketch.points(crank))), "add": True})
 
 
-def _rrr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
-    first = bar(sketch, pins[0], list(at or _across(sketch, pins, APEX)))
-    bar(sketch, pins[1], _end(sketch, first))
+def _rrr(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
+    if at is None:
+        start, end = (place_of(sketch, pin) for pin in pins)
+        if start == end:
+            raise refused("has its two pins on one spot", "the block", "choose two that are apart")
+        at = (start + end) / 2 + APEX * 1j * (end - start)
+    bar(sketch, pins[1], _end(sketch, bar(sketch, pins[0], at)))
 
 
-def _rrp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
-    x, y = place_of(sketch, pins[0])
-    level = next((sketch.places[f"{sketch.ground}.{name}"][1] for name in sketch.points(sketch.ground)), y)
-    rod = bar(sketch, pins[0], list(at or (x + 2 * max(sketch.size, 0.04), level)))
+def _rrp(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
+    pin, ground = place_of(sketch, pins[0]), sketch.ground
+    level = next((sketch.places[f"{ground}.{name}"].imag for name in sketch.points(ground)), pin.imag)
+    usual = complex(pin.real + 2 * max(sketch.size, SMALLEST), level)
+    rod = bar(sketch, pins[0], usual if at is None else at)
     slide(sketch, {"joint": _end(sketch, rod), "angle": 0.0})
 
 
-def _rpr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+def _rpr(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
     if not isinstance(pins[1], str):
         raise refused("is what slides along the link", "the second pin", "choose a pin that is drawn")
-    (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
-    lever = bar(sketch, pins[0], list(at or (x + BEYOND * (a - x), y + BEYOND * (b - y))))
+    start, end = (place_of(sketch, pin) for pin in pins)
+    lever = bar(sketch, pins[0], start + LEVER * (end - start) if at is None else at)
     slide(sketch, {"joint": pins[1], "along": lever})
 
 
-def _rpp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+def _rpp(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
     """A block on the pin, in a slot of a link that is guided across the slot: towards `at`, or along x."""
     if not isinstance(pins[0], str):
         raise refused("carries the block that slides in the slot", "the pin", "choose a pin that is drawn")
-    x, y = place_of(sketch, pins[0])
-    a, b = at or (x + max(sketch.size, 0.04), y)
-    angle, half = atan2(b - y, a - x), max(sketch.size, 0.04)
-    across = (-half * sin(angle), half * cos(angle))
-    yoke = bar(sketch, [x - across[0], y - across[1]], [x + across[0], y + across[1]])
+    pin, half = place_of(sketch, pins[0]), max(sketch.size, SMALLEST)
+    guide = pin + half if at is None else at
+    across = 1j * rect(half, phase(guide - pin))
+    yoke = bar(sketch, pin - across, pin + across)
     slide(sketch, {"joint": pins[0], "along": yoke, "near": half})
-    slide(sketch, {"joint": {"on": yoke, "at": [a, b]}, "angle": angle})
+    slide(sketch, {"joint": {"on": yoke, "at": guide}, "angle": phase(guide - pin)})
 
 
-def _prp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+def _prp(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
     """A pin between a block that slides along the link of the pin that is given, and one in a guide on the ground."""
     carrier, _ = point_of(sketch, pins[0])
     if carrier == sketch.ground:
         raise refused("is on no link that moves", "the pin", "choose a pin of the link along which it slides")
     spots = [sketch.places[f"{carrier}.{point}"] for point in sketch.points(carrier)]
-    x, y = at or (sum(spot[0] for spot in spots) / len(spots), sum(spot[1] for spot in spots) / len(spots))
-    _, (c, s), _ = line_near(sketch, carrier, (x, y))
-    slider, point, angle = numbered(sketch, "links", "block"), letter(sketch), atan2(c, -s)  # across the link
+    place = sum(spots) / len(spots) if at is None else at
+    _, direction, _ = line_near(sketch, carrier, place)
+    slider, point = numbered(sketch, "links", "block"), letter(sketch)
     sketch.section("links")[slider] = {"points": {point: [0, 0]}}
-    sketch.show(slider, Frame(x, y, cos(angle), sin(angle)))
-    slide(sketch, {"joint": {"on": slider, "at": [x, y]}, "angle": angle})
+    sketch.show(slider, Frame(place, 1j * direction))  # across the link
+    slide(sketch, {"joint": {"on": slider, "at": place}, "angle": phase(1j * direction)})
     slide(sketch, {"joint": f"{slider}.{point}", "along": carrier})
 
 
-def _triad(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+def _triad(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
     """A group of class III: a link with three pins on three rods."""
     spots = [place_of(sketch, pin) for pin in pins]
-    x, y = at or (sum(spot[0] for spot in spots) / 3, sum(spot[1] for spot in spots) / 3)
-    c, s = INNER * cos(TURNED), INNER * sin(TURNED)
-    corners = [[x + c * (a - x) - s * (b - y), y + s * (a - x) + c * (b - y)] for a, b in spots]
+    middle = sum(spots) / 3 if at is None else at
+    corners = [middle + CORNER * (spot - middle) for spot in spots]
     first, second = (bar(sketch, pin, corner) for pin, corner in zip(pins[:2], corners, strict=False))
     plate = bar(sketch, _end(sketch, first), _end(sketch, second))
     bar(sketch, pins[2], {"on": plate, "at": corners[2]})
@@ -157,7 +154,6 @@ def _loop_in_space(sketch: Sketch, angle: str) -> str:
     return "Add CCC"
 
 
-BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {
+BLOCKS: dict[str, Callable[[Sketch, list[Any], complex | None], None]] = {
     "driver": _crank, "RRR": _rrr, "RRP": _rrp, "RPR": _rpr, "PRP": _prp, "RPP": _rpp, "triad": _triad,
-    "CCC": lambda *_: None, "gear": lambda *_: None,
 }  # fmt: skip

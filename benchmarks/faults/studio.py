@@ -38,7 +38,7 @@ FAULTS = (
     Fault(
         "folder-is-read-without-the-token",
         "studio/server.py",
-        'Route("/files", self._admitted(self._files))',
+        'Route("/files", self._own(self._files, admitted=True))',
         'Route("/files", self._own(self._files))',
         ("tests/studio/test_server.py", "-k", "without_the_token"),
     ),

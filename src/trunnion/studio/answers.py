@@ -37,7 +37,7 @@ from trunnion.studio.layers import centres_of, corner_of, measured, seats_of, tr
 from trunnion.studio.live import Live, live_in_space, places_at, thumbnail, tracks, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded, columns_of
 from trunnion.studio.message import packed
-from trunnion.studio.sketch import Sketch
+from trunnion.studio.sketch import Sketch, refused
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
 from trunnion.views.bodies import gathered
@@ -49,8 +49,7 @@ if TYPE_CHECKING:
 __all__ = ["ANSWERS", "answer"]
 
 MOST_OTHERS = 3  # assemblies
-FILES = {"csv": ("csv", "text/csv"), "report": ("html", "text/html"), "png": ("png", "image/png"),
-         "svg": ("svg", "image/svg+xml")}  # fmt: skip
+FILES = {"csv": "text/csv", "report": "text/html", "png": "image/png", "svg": "image/svg+xml"}
 MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
 
 
@@ -120,7 +119,7 @@ def _model(question: Asked) -> dict[str, Any]:
     result, answer_so_far = _solved(question, lambda: question.cycle.motion)
     numbers: Mapping[str, Any] = {}
     with suppress(MechanismError):  # of what is half drawn those that can be read
-        numbers = state.mechanism.parameters() if state.mechanism else _sketch(question).numbers
+        numbers = state.mechanism.parameters() if state.mechanism else Sketch(dict(state.entries or {})).numbers
     head = answer_so_far | {
         "numbers": {path: float(np.ravel(primal(value))[0]) for path, value in numbers.items()},
         "entries": state.entries, "solved": result is not None, "bare": state.bare, "scene": None,
@@ -138,12 +137,6 @@ def _model(question: Asked) -> dict[str, Any]:
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         **measured(state.run),
     }  # fmt: skip
-
-
-def _sketch(question: Asked, places: dict[str, complex] | None = None) -> Sketch:
-    """A drawing of a model's entries that may be changed."""
-    entries = copy.deepcopy(dict(question.state.entries or {}))
-    return Sketch(entries, places or {}, fine=float(question.get("fine") or 0.0))
 
 
 @uncollected()
@@ -247,10 +240,10 @@ def _edit(question: Asked) -> dict[str, Any]:
     if state.entries is None:
         raise MechanismError(state.findings)
     places = {str(key): complex(float(x), float(y)) for key, (x, y) in dict(question.get("places") or {}).items()}
-    sketch = _sketch(question, places)
+    entries = copy.deepcopy(dict(state.entries))
     if not text.strip():
-        sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
-    sketch.turns = partial(_turns, state)
+        entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
+    sketch = Sketch(entries, places, fine=float(question.get("fine") or 0.0), turns=partial(_turns, state))
     says = [_done(sketch, gesture) for gesture in question["gestures"]]
     empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: entry for key, entry in sketch.entries.items() if entry or key not in empty}
@@ -277,14 +270,14 @@ def _done(sketch: Sketch, request: Mapping[str, Any]) -> str:
     """Do a gesture; what it is called. MechanismError if it cannot be done."""
     gesture = GESTURES.get(str(request.get("do")))
     if gesture is None:
-        raise MechanismError(Finding(f"'{request.get('do')}' is no gesture", "studio", f"use {', '.join(GESTURES)}"))
+        raise refused(f"'{request.get('do')}' is no gesture", "studio", f"use {', '.join(GESTURES)}")
     try:
         words = gesture(sketch, request)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         if isinstance(error, MechanismError):
             raise
         what = f"the gesture '{request['do']}' does not fit the model ({error})"
-        raise MechanismError(Finding(what, "studio", "undo, or correct the text of the model")) from error
+        raise refused(what, "studio", "undo, or correct the text of the model") from error
     sketch.forget()
     return words
 
@@ -294,8 +287,7 @@ def _turns(state: Loaded, index: int) -> dict[str, Any]:
     poses = gathered(state.cycle(STEPS, True).motion).poses
     turns = {link: pose.matrix[:, :, index % STEPS] for link, pose in poses.items()}
     if not all(np.isfinite(turn).all() for turn in turns.values()):
-        what = "cannot be assembled at the position that is shown"
-        raise MechanismError(Finding(what, remedy="go to another position"))
+        raise refused("cannot be assembled at the position that is shown", "", "go to another position")
     return turns
 
 
@@ -310,9 +302,7 @@ def _assemblies(question: Asked) -> dict[str, Any]:
     stated = dict(entries.get("assembly") or {})
     ways = [(modes, mode) for modes in choices(question.state.run) for mode in modes.ways if not mode.taken]
     for modes, mode in ways[:MOST_OTHERS]:
-        changes = {name: None for name in stated if name in mode.joints or name in modes.links} | {
-            modes.link: mode.name
-        }
+        changes = {name: None for name in stated if name in (*mode.joints, *modes.links)} | {modes.link: mode.name}
         hints = {name: hint for name, hint in (stated | changes).items() if hint is not None}
         with suppress(MechanismError):  # what is stated elsewhere in the model may forbid this one
             run = prepare(Mechanism(**{**entries, "assembly": hints}))
@@ -402,7 +392,6 @@ def _export(question: Asked) -> dict[str, Any]:
         raise MechanismError(state.findings)
     if what not in FILES:
         raise MechanismError(Finding(f"'{what}' is no file of the studio", remedy=f"use {', '.join(FILES)}"))
-    ending, mime = FILES[what]
     result = state.cycle(steps, True).result
     if what == "csv":
         content = str(frame(result, units="model").to_csv(index=False, lineterminator="\n")).encode()
@@ -413,14 +402,14 @@ def _export(question: Asked) -> dict[str, Any]:
         mechanism(result, index=question.index).savefig(stream, format=what)
         content = stream.getvalue()
     stem = "".join(sign if sign.isalnum() else "-" for sign in str((state.entries or {}).get("name") or ""))
-    return {"name": f"{stem[:60].strip('-') or 'mechanism'}.{ending}", "mime": mime, "bytes": content}
+    name = f"{stem[:60].strip('-') or 'mechanism'}.{'html' if what == 'report' else what}"
+    return {"name": name, "mime": FILES[what], "bytes": content}
 
 
 def _corner(question: Asked) -> dict[str, Any]:
     """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    return corner_of(
-        question.cycle.run.system.mechanism, str(question["measure"]), question.get("side"), question.steps
-    )
+    mechanism = question.cycle.run.system.mechanism
+    return corner_of(mechanism, str(question["measure"]), question.get("side"), question.steps)
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {

@@ -44,7 +44,12 @@ DIRECTED = {"seat", "seat_on", "misalignment", "only", "backward"}  # keys that 
 def put_value(sketch: Sketch, gesture: Fields) -> str:
     """An entry gets a value; without one it goes."""
     *parents, last = gesture["path"]
-    _refuse_missing(sketch, gesture["path"])
+    section, name, *inner = gesture["path"] if len(parents) > 1 else ("", "")
+    if section in SECTIONS:  # a value is not enough to make a part: what is gone stays gone
+        in_loop = {row.get("link") for row in sketch.rows if section == "links"}  # links that need not be stated
+        point = inner[1] if section == "links" and inner[0] == "points" and len(inner) > 1 else None
+        if name not in sketch.names(section) | in_loop or (point is not None and point not in sketch.points(name)):
+            raise refused("is not there", ".".join(map(str, gesture["path"])), "choose what is drawn")
     group: Any = sketch.entries
     for key in parents:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
@@ -64,17 +69,6 @@ def put_value(sketch: Sketch, gesture: Fields) -> str:
     if isinstance(group, dict):
         group.pop(last, None)
     return f"Remove {words}"
-
-
-def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
-    """A value is not enough to make a part: one that is gone does not come back as a group without its links."""
-    section, name, *inner = path if len(path) > 2 else ("", "")
-    if section not in SECTIONS:
-        return
-    links = {row.get("link") for row in sketch.rows} if section == "links" else set()  # they need not be stated
-    point = inner[1] if section == "links" and inner[0] == "points" and len(inner) > 1 else None
-    if name not in sketch.names(section) | links or (point is not None and point not in sketch.points(name)):
-        raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
 def _written(sketch: Sketch, value: Any, defines: bool) -> Any:
@@ -98,11 +92,19 @@ def delete(sketch: Sketch, gesture: Fields) -> str:
     """An entry goes, and what cannot be without it."""
     section, name = map(str, gesture["what"])
     before = _orphans(sketch)  # of an unfinished file: it stays
+    in_loop = [(index, row) for index, row in enumerate(sketch.rows) if row.get(section[:-1]) == name]
     if section == "points":
         link, name = free(sketch, name)
         del sketch.section("links")[link]["points"][name]
-    elif section in SIDES and any(row.get(section[:-1]) == name for row in sketch.rows):
-        _delete_row(sketch, section[:-1], name)
+    elif (
+        section in SIDES and in_loop
+    ):  # a joint goes with the link after it, that before it where the ground comes after
+        (index, row), *_ = in_loop
+        if len(sketch.rows) < 3 or (section, name) == ("links", sketch.ground):
+            raise refused("cannot go: the loop would not close", name, "change its type, twist or distance")
+        if row.get("link") == sketch.ground:
+            sketch.rows[index - 1]["link"] = sketch.ground
+        del sketch.entries["loop"][index]
     else:
         if section not in SECTIONS or name not in sketch.section(section):
             raise refused("is not there", f"{section}.{name}", "choose what is drawn")
@@ -117,16 +119,6 @@ def delete(sketch: Sketch, gesture: Fields) -> str:
             del group[last]
         sketch.forget()
     return f"Delete {SECTIONS.get(section, 'point')} {name}"
-
-
-def _delete_row(sketch: Sketch, key: str, name: str) -> None:
-    """A joint of a loop goes with the link after it; that before it where the ground comes after it."""
-    index, row = next((index, row) for index, row in enumerate(sketch.rows) if row.get(key) == name)
-    if len(sketch.rows) < 3 or (key, name) == ("link", sketch.ground):
-        raise refused("cannot go: the loop would not close", name, "change its type, twist or distance")
-    if row.get("link") == sketch.ground:
-        sketch.rows[index - 1]["link"] = sketch.ground
-    del sketch.entries["loop"][index]
 
 
 def _orphans(sketch: Sketch) -> set[tuple[str, ...]]:

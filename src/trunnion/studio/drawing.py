@@ -99,9 +99,7 @@ def place_of(sketch: Sketch, end: Any) -> complex:
 
 def free(sketch: Sketch, name: str) -> tuple[str, str]:
     """Link and name of a point that is no joint."""
-    link, _, point = str(name).partition(".")
-    if point not in sketch.points(link):
-        raise refused("is not a free point", str(name), "choose the free end of a link")
+    link, point = located(sketch, name)
     if point in sketch.joints:
         remedy = "delete the joint first, or draw another link from it"
         raise refused("is a joint already", f"links.{link}.points.{point}", remedy)
@@ -164,15 +162,10 @@ def put(sketch: Sketch, link: str, point: str, place: complex, axis: complex | N
     entry: Any = [sketch.length(part) if abs(part) > least else 0 for part in (local.real, local.imag)]
     if axis is not None:
         direction = axis * frame.turn.conjugate()
-        entry = {"at": entry, "axis": [_short(direction.real), _short(direction.imag)]}
+        parts = [round(part, 12) + 0.0 for part in (direction.real, direction.imag)]  # without the noise of rounding
+        entry = {"at": entry, "axis": [int(part) if part.is_integer() else part for part in parts]}
     sketch.section("links")[link]["points"][point] = entry
     sketch.places[f"{link}.{point}"] = place
-
-
-def _short(part: float) -> float | int:
-    """A component of a direction, without the noise of rounding."""
-    rounded = round(part, 12) + 0.0
-    return int(rounded) if rounded.is_integer() else rounded
 
 
 def line_near(sketch: Sketch, link: str, place: complex) -> tuple[complex, complex, float]:

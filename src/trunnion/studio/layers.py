@@ -16,7 +16,7 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
 from trunnion.studies.design import instant_centres, transmission_angles
-from trunnion.studio.live import column
+from trunnion.studio.live import columns
 from trunnion.studio.message import Exact
 from trunnion.views.as_built import seated
 from trunnion.views.scene import scene
@@ -60,8 +60,8 @@ def transmission_of(walk: Forward, steps: int) -> list[dict[str, Any]]:
     """Transmission angle of each dyad, rad, 0 … π/2, and its middle joint."""
     middle = {"-".join(module.joints): module.joints[1:2] for module in walk.system.plan.modules}
     angles = transmission_angles(walk)
-    return [{"name": name, "joint": joint, "angle": column(angle, steps)}
-            for name, angle in angles.items() for joint in middle[name]]  # fmt: skip
+    rows = zip(angles, columns(list(angles.values()), steps), strict=True)
+    return [{"name": name, "joint": joint, "angle": angle} for name, angle in rows for joint in middle[name]]
 
 
 # ---- the worst corner ---------------------------------------------------------------------------------------------

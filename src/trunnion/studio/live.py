@@ -10,8 +10,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from math import cos, radians, sin
 from typing import Any
 
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import flat
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
@@ -28,8 +27,9 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import status_of
 from trunnion.solve.system import Values, rubbing
 from trunnion.studio.loaded import Asked, Loaded, loaded
+from trunnion.studio.sketch import refused
 
-__all__ = ["Live", "column", "live_in_space", "places_at", "thumbnail", "tracks", "uncollected"]
+__all__ = ["Live", "columns", "live_in_space", "places_at", "thumbnail", "tracks", "uncollected"]
 
 Array = NDArray[np.float64]
 
@@ -64,11 +64,6 @@ def tracked(state: Loaded, steps: int) -> dict[str, dict[str, Array]]:
     return tracks(state.run.posed(state.run.cycle.times(steps), state.run.values), steps)
 
 
-def column(number: Any, steps: int) -> Array:
-    """A number of a walk at every position."""
-    return np.broadcast_to(np.asarray(primal(number), float), (steps,))
-
-
 def columns(numbers: Sequence[Any], steps: int) -> Array:
     """Numbers of a walk at every position, (number, position): a call for each takes longer than all of them."""
     table = np.empty((len(numbers), steps))
@@ -98,51 +93,33 @@ def tracks(walk: Forward, steps: int, points: Iterable[tuple[str, str]] | None =
 def places_at(question: Asked) -> dict[str, complex]:
     """Where the points of a model are at the position that is shown, m; MechanismError where it has no answer."""
     if question.state.run.system.spatial:
-        raise MechanismError(Finding("is dragged in space by steps along its axes", remedy="state by how much"))
+        raise refused("is dragged in space by steps along its axes", "", "state by how much")
     paths, index = tracked(question.state, question.steps), question.index
     places = {key: complex(track["x"][index], track["y"][index]) for key, track in paths.items()}
     if not np.all(np.isfinite(list(places.values()))):
-        what = "cannot be assembled at the position that is shown"
-        raise MechanismError(Finding(what, remedy="go to another position"))
+        raise refused("cannot be assembled at the position that is shown", "", "go to another position")
     return places
 
 
 # ---- while numbers change -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
 class Live:
     """A mechanism in the plane while its numbers are changed.
 
     Parameters
     ----------
-    run
-        The mechanism as it is stated.
-    values
-        Numbers that are replaced, SI, by path.
-    steps
-        Positions of its cycle.
+    run : the mechanism as it is stated.
+    values : numbers that are replaced, SI, by path.
+    steps : positions of its cycle.
     """
 
-    run: Run
-    values: Mapping[str, float]
-    steps: int
-    _backs: dict[int, Backward] = field(default_factory=dict)
-
-    @cached_property
-    def time(self) -> Array:
-        """Of the positions, s."""
-        return np.asarray(self.run.cycle.times(self.steps))
-
-    @cached_property
-    def numbers(self) -> Values:
-        """All numbers, the replaced ones among them."""
-        return self.run.system.mechanism.parameters(self.values) if self.values else self.run.values
-
-    @property
-    def few(self) -> bool:
-        """Whether all positions are solved in the time of a picture; else the shown one alone is."""
-        return len(self.run.system.joints) * self.steps <= AT_ONCE
+    def __init__(self, run: Run, values: Mapping[str, float], steps: int) -> None:
+        self.run, self.steps = run, steps
+        self.numbers = run.system.mechanism.parameters(values) if values else run.values
+        self.time = np.asarray(run.cycle.times(steps))
+        self.few = len(run.system.joints) * steps <= AT_ONCE  # all are solved in time; else the shown position alone
+        self._backs: dict[int, Backward] = {}
 
     def solved(self, index: int) -> Backward:
         """Motion and forces of all positions, of many joints those of one position."""
@@ -154,11 +131,16 @@ class Live:
     @np.errstate(all="ignore")
     def nearest(self, link: str, point: str, to: complex, index: int, slack: float) -> int:
         """Position at which a point of a link is nearest to a place, m: `index` unless another is nearer by `slack`."""
-        far = _far(self.solved(index).walk, link, point, to)
+
+        def distances(walk: Forward) -> Array:
+            track = tracks(walk, len(walk.time), [(link, point)])[f"{link}.{point}"]
+            return np.hypot(track["x"] - to.real, track["y"] - to.imag)
+
+        far = distances(self.solved(index).walk)
         if len(far) < self.steps:
             if far[0] <= slack:
                 return index
-            far = _far(self.run.posed(self.time, self.numbers), link, point, to)
+            far = distances(self.run.posed(self.time, self.numbers))
         if not np.any(np.isfinite(far)):
             return index
         near = int(np.nanargmin(far))
@@ -194,26 +176,26 @@ class Live:
         sines, cosines = (columns([getattr(frame, part) for frame in walk.frames.values()], steps) for part in "sc")
         lanes = np.arange(self.steps) == index if self.few else np.True_
         here = int(status[index if self.few else 0])
+        moving = {}
+        if not self.few:  # where each joint and each free point goes that moves, at as many positions as can be drawn
+            ground = system.mechanism.fixed_link
+            still = {name for name, (_, links) in system.joints.items() if ground in links and system.turns(name)}
+            ends = {(links[1], name) for name, (_, links) in system.joints.items() if name not in still}
+            ends |= {(link, name) for link, name in system.points if link != ground and name not in system.joints}
+            time = self.time[:: -(-len(ends) * self.steps // MOST_TRACKED)]
+            moving = {"tracks": tracks(self.run.posed(time, self.numbers), len(time), ends)}
         return {
             "points": tracks(walk, steps),
             "angles": dict(zip(walk.frames, np.arctan2(sines, cosines), strict=True)),
             "status": [int(code) for code in status],
             "efforts": joints.pop(""),
             "joints": joints,
-            **({} if self.few else {"tracks": self._tracks()}),
+            **moving,
             "margin": _margin(self.run, self.numbers, back, here, self.time[index], lanes),
         }
 
-    def _tracks(self) -> dict[str, dict[str, Array]]:
-        """Where each joint and each free point goes that moves, at as many positions as can be drawn in time."""
-        system, ground = self.run.system, self.run.system.mechanism.fixed_link
-        still = {name for name, (_, links) in system.joints.items() if ground in links and system.turns(name)}
-        joints = {(links[1], name) for name, (_, links) in system.joints.items() if name not in still}
-        free = {(link, name) for link, name in system.points if link != ground and name not in system.joints}
-        time = self.time[:: -(-len(joints | free) * self.steps // MOST_TRACKED)]
-        return tracks(self.run.posed(time, self.numbers), len(time), joints | free)
 
-
+@np.errstate(all="ignore")
 def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int) -> dict[str, Any]:
     """A mechanism in space with some numbers replaced: its scene, for bodies change with numbers, and its margin."""
     from trunnion.cycle.positions import positions  # not for the first picture
@@ -221,12 +203,10 @@ def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int)
     from trunnion.views.scene import scene
 
     changed = prepare(run.system.mechanism.with_values(values)) if values else run
-    with np.errstate(all="ignore"):
-        result = result_of(changed, positions(changed, steps, averaged=False, margin=False)).dataset
-        back = changed.solve(changed.cycle.times(steps)[[index]])
-        status = [int(code) for code in result["status"].values]
-        here, time = status[index], float(changed.cycle.times(steps)[index])
-        margin = _margin(changed, changed.values, back, here, time, np.True_)
+    times = changed.cycle.times(steps)
+    result = result_of(changed, positions(changed, steps, averaged=False, margin=False)).dataset
+    status, back = [int(code) for code in result["status"].values], changed.solve(times[[index]])
+    margin = _margin(changed, changed.values, back, status[index], float(times[index]), np.True_)
     return {"scene": scene(result, max_positions=steps), "status": status, "margin": margin}
 
 
@@ -250,12 +230,6 @@ def _margin(run: Run, numbers: Values, back: Backward, status: int, time: float,
     if np.isnan(margin):
         return {"value": None, "beyond": False}
     return {"value": min(margin, NEAR), "beyond": many or margin > NEAR}
-
-
-def _far(walk: Forward, link: str, point: str, to: complex) -> Array:
-    """Distance of a point of a link from a place at each position, m."""
-    track = tracks(walk, len(walk.time), [(link, point)])[f"{link}.{point}"]
-    return np.hypot(track["x"] - to.real, track["y"] - to.imag)
 
 
 # ---- small pictures of the examples -----------------------------------------------------------------------------

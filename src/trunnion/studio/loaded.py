@@ -49,6 +49,7 @@ class Cycle:
 
     def __init__(self, run: Run, steps: int) -> None:
         self.run, self.steps = run, steps
+        self._figures: xr.Dataset | None = None
         self._working_out = Lock()
 
     @cached_property
@@ -72,16 +73,13 @@ class Cycle:
     @property
     def result(self) -> xr.Dataset:
         """What `analyse` gives, of the same positions; who asks while it is worked out waits for it."""
-        with self._working_out:
-            return self._result
-
-    @cached_property
-    def _result(self) -> xr.Dataset:
         from trunnion.cycle.positions import over_cycle
         from trunnion.cycle.summary import result_of
 
-        with np.errstate(all="ignore"):
-            return result_of(self.run, over_cycle(self.run, self.positions)).dataset
+        with self._working_out, np.errstate(all="ignore"):
+            if self._figures is None:
+                self._figures = result_of(self.run, over_cycle(self.run, self.positions)).dataset
+            return self._figures
 
     @cached_property
     def columns(self) -> dict[str, Column]:
@@ -151,7 +149,16 @@ def _loaded(text: str) -> Loaded:
         return Loaded(text, None, {}, None, error.findings)
     if not entries:
         return Loaded(text, {}, {}, None, ())
-    mechanism, findings = None, [*version_findings(entries), *_refusals(entries)]
+    mechanism, findings = None, list(version_findings(entries))
+    findings += [
+        Finding(f"names the file '{name[:60]}', which the studio does not read", f"{section}.{key}.file",
+                "write its points into the model, or analyse it on the command line")
+        for section, key, name in stated_files(entries)
+    ]  # fmt: skip
+    links = entries.get("links")
+    if isinstance(links, dict) and len(links) > MOST_LINKS:
+        what = f"are {len(links):,}; the studio solves {MOST_LINKS} at most"
+        findings.append(Finding(what, "links", "analyse it on the command line"))
     try:
         if not findings:
             mechanism = Mechanism(**entries)
@@ -195,17 +202,3 @@ class Asked(dict[str, Any]):
     def cycle(self) -> Cycle:
         """Its cycle; MechanismError where it has no motion."""
         return self.state.cycle(self.steps, self.friction)
-
-
-def _refusals(entries: Mapping[str, Any]) -> list[Finding]:
-    """What the studio does not do: read other files, solve masses of links."""
-    refusals = [
-        Finding(f"names the file '{name[:60]}', which the studio does not read", f"{section}.{key}.file",
-                "write its points into the model, or analyse it on the command line")
-        for section, key, name in stated_files(entries)
-    ]  # fmt: skip
-    links = entries.get("links")
-    if isinstance(links, dict) and len(links) > MOST_LINKS:
-        what = f"are {len(links):,}; the studio solves {MOST_LINKS} at most"
-        refusals.append(Finding(what, "links", "analyse it on the command line"))
-    return refusals

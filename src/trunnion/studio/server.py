@@ -97,13 +97,13 @@ class Studio:
         routes = [
             Route("/", self._own(self._page)),
             Route("/modules.js", self._own(self._modules)),
-            Route("/files", self._admitted(self._files)),
-            Route("/file/{name:path}", self._admitted(self._read)),
-            Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
-            Route("/import/{name}", self._admitted(_imported), methods=["PUT"]),
-            Route("/jobs", self._admitted(self._jobs)),
-            Route("/jobs", self._admitted(self._start), methods=["PUT"]),
-            Route("/jobs/{number}", self._admitted(self._stop), methods=["DELETE"]),
+            Route("/files", self._own(self._files, admitted=True)),
+            Route("/file/{name:path}", self._own(self._read, admitted=True)),
+            Route("/file/{name:path}", self._own(self._write, admitted=True), methods=["PUT"]),
+            Route("/import/{name}", self._own(_imported, admitted=True), methods=["PUT"]),
+            Route("/jobs", self._own(self._jobs, admitted=True)),
+            Route("/jobs", self._own(self._start, admitted=True), methods=["PUT"]),
+            Route("/jobs/{number}", self._own(self._stop, admitted=True), methods=["DELETE"]),
             Route("/result/{code}", self._own(self._result)),
             Route("/{place:str}/{name:path}", self._own(self._asset)),
             WebSocketRoute("/socket", self._socket),
@@ -156,9 +156,6 @@ class Studio:
                 return JSONResponse({"error": f"The studio made a mistake: {_reason(error)}"}, status_code=500)
 
         return guarded
-
-    def _admitted(self, handle: Handler) -> Handler:
-        return self._own(handle, admitted=True)
 
     # ---- the page -------------------------------------------------------------------------------------------------
 
@@ -319,12 +316,11 @@ class Studio:
 
 
 async def _imported(request: Request) -> Response:
+    return JSONResponse(await run_in_threadpool(_import, request.path_params["name"], await request.body()))
+
+
+def _import(name: str, content: bytes) -> dict[str, Any]:
     """The text of a model made of a dropped file of another program, `{text, says}`."""
-    text, says = await run_in_threadpool(_import, request.path_params["name"], await request.body())
-    return JSONResponse({"text": text, "says": says})
-
-
-def _import(name: str, content: bytes) -> tuple[str, list[str]]:
     from trunnion.exchange.formats import import_file
     from trunnion.exchange.model_file import model_text
 
@@ -334,12 +330,10 @@ def _import(name: str, content: bytes) -> tuple[str, list[str]]:
         try:
             draft = import_file(path)
         except MechanismError as error:
-            why = "; ".join(
-                f"{finding.what}{f' ({finding.remedy})' if finding.remedy else ''}" for finding in error.findings[:3]
-            )
-            raise ValueError(f"{name[:80]} {why}") from None
+            reasons = [f"{row.what} ({row.remedy})" if row.remedy else row.what for row in error.findings[:3]]
+            raise ValueError(f"{name[:80]} {'; '.join(reasons)}") from None
     draft.source, draft.name = name, Path(name).stem if draft.name == "dropped" else draft.name
-    return model_text(draft), [f"{finding.where}: {finding.what}" for finding in draft.findings]
+    return {"text": model_text(draft), "says": [f"{finding.where}: {finding.what}" for finding in draft.findings]}
 
 
 def _warm(text: str) -> None:

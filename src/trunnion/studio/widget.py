@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import anywidget
@@ -61,23 +61,19 @@ class StudioWidget(anywidget.AnyWidget):
         self.send({"id": message["id"], "status": status}, [body])
 
     def _request(self, path: str, body: bytes) -> tuple[int, bytes]:
-        kind = path.strip("/").partition("/")[0]
-        routes: dict[str, Callable[[], bytes]] = {
-            "files": self._files,
-            "file": lambda: self._saved(body) if body else json.dumps({"text": self.text}).encode(),
-            "jobs": lambda: json.dumps({"forms": [], "jobs": []}).encode(),
-        }
-        if kind not in routes:
-            return 404, json.dumps({"error": "A notebook does not do that: use the command line."}).encode()
-        return 200, routes[kind]()
-
-    def _files(self) -> bytes:
-        digest = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
-        return json.dumps({"folder": "notebook", "id": digest, "open": NAME, "files": [NAME]}).encode()
-
-    def _saved(self, body: bytes) -> bytes:
-        self.text = str(json.loads(body)["text"])
-        return json.dumps({"saved": NAME}).encode()
+        """What the server answers of its files and studies: a folder of one file, and no studies."""
+        kind, status, reply = path.strip("/").partition("/")[0], 200, dict[str, Any]()
+        if kind == "files":
+            digest = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
+            reply = {"folder": "notebook", "id": digest, "open": NAME, "files": [NAME]}
+        elif kind == "file":
+            self.text = str(json.loads(body)["text"]) if body else self.text
+            reply = {"saved": NAME} if body else {"text": self.text}
+        elif kind == "jobs":
+            reply = {"forms": [], "jobs": []}
+        else:
+            status, reply = 404, {"error": "A notebook does not do that: use the command line."}
+        return status, json.dumps(reply).encode()
 
 
 def studio(mechanism: Mechanism, height: int = 720) -> StudioWidget:

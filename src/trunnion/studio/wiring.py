@@ -52,8 +52,7 @@ def _place(sketch: Sketch, text: Any) -> complex:
 
 def _end(sketch: Sketch, name: str) -> str:
     """The free point of a link that was just drawn."""
-    point = next(point for point in reversed(list(sketch.points(name))) if point not in sketch.joints)
-    return f"{name}.{point}"
+    return f"{name}.{list(sketch.points(name))[-1]}"
 
 
 # ---- what each block draws: at its pins, its inner pin or the end of its link `at` a place, or as it fits -----------
@@ -68,8 +67,6 @@ def _crank(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
 def _rrr(sketch: Sketch, pins: list[Any], at: complex | None) -> None:
     if at is None:
         start, end = (place_of(sketch, pin) for pin in pins)
-        if start == end:
-            raise refused("has its two pins on one spot", "the block", "choose two that are apart")
         at = (start + end) / 2 + APEX * 1j * (end - start)
     bar(sketch, pins[1], _end(sketch, bar(sketch, pins[0], at)))
 

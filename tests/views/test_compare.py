@@ -19,7 +19,9 @@ from rig_measurements import measured, rocker
 from trunnion.cli.app import main
 from trunnion.results.tables.studies import COMPARISON as TABLES
 from trunnion.rig.reading.measurement import Measurement
-from trunnion.views.compare import efficiencies, report
+from trunnion.views import draw
+from trunnion.views.charts import Plot
+from trunnion.views.compare import course, efficiencies, report
 from trunnion.views.shown import figure_of as figure
 
 POWERS = ("torque", "speed", "brake", "out")
@@ -93,6 +95,8 @@ def test_what_was_set_stands_beside_the_courses_of_its_condition():
         own = dict(zip(result["condition"].values, result["value"].sel({"set": name}).values, strict=True))
         assert len(set(own.values())) > 1
         assert columns[name].tolist() == [own[one] for one in columns["condition"]]
+    drawn = draw.figure(result, Plot("", [course(result, 0, 3, 62)]))  # as in a report
+    assert drawn.subfigs[0].get_suptitle() == str(result["condition"].values[3])
 
 
 @cache

@@ -156,12 +156,11 @@ def varied(result: xr.Dataset) -> list[Scale]:
 
 
 def label(result: xr.Dataset, condition: int) -> str:
-    """The name of a condition and what was set in it."""
-    name, several = names(result, "condition")[condition], varied(result)
-    values = [f"{scale.name} {setting(scale.values[condition], scale.unit)}"
-              for scale in several or settings(result)[:2] if np.isfinite(scale.values[condition])]  # fmt: skip
-    named = all(scale.name in name for scale in several)  # as a name made of the settings has them
-    return name if named or not values else f"{name}: {', '.join(values)}"
+    """The name of a condition, and what was set in it that is not in its name."""
+    name = names(result, "condition")[condition]
+    values = [f"{scale.name} {setting(scale.values[condition], scale.unit)}" for scale in varied(result)
+              if scale.name not in name and np.isfinite(scale.values[condition])]  # fmt: skip
+    return f"{name}: {', '.join(values)}" if values else name
 
 
 def setting(value: float, unit: str) -> str:

@@ -310,7 +310,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         for k in (k for k in same if np.isfinite(figures[k])):
             aspect = aspects.get(labels[k], "")
             level = aspect in LEVELS and figure_units[k] == units[i]  # what is none stands in the legend alone
-            text = f"{labels[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
+            text = f"{labels[k]}: {aspect and f'{aspect} '}{quantity(float(figures[k]), figure_units[k])}"
             look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
             marks.append(Rule(figures[k] * scale[0] if level else np.nan, text, look, upright=False))
         line = Line(over.values, values[i], title, Look(0, 2.0), close=True)

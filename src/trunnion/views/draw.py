@@ -118,7 +118,7 @@ def figure(result: xr.Dataset, plot: Plot) -> Figure:
         for part, panel in zip(parts, plot.panels, strict=False):
             if not panel.charts:  # of a measure that lacks this figure
                 continue
-            if panel.title and len(plot.panels) > 1:
+            if panel.title and (len(plot.panels) > 1 or not plot.title):
                 part.suptitle(plain(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
             ratios = list(panel.parts) or [1.0] * len(panel.charts)
             stacked = part.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]

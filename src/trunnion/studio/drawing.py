@@ -202,7 +202,7 @@ def bar(sketch: Sketch, *ends: Any, length: Any = None) -> str:
     start, finish = places = [place_of(sketch, end) for end in ends]
     far = abs(finish - start)
     if far <= SHORTEST:
-        raise refused("the link has no length", "", "click at two places")
+        raise refused("the link has no length", "", "choose two places that are apart")
     name = numbered(sketch, "links", "link")
     sketch.section("links")[name] = {"points": {}}
     for end, place, local in zip(ends, places, (0, length or sketch.length(far)), strict=True):

@@ -129,6 +129,25 @@ def test_what_is_constant_has_no_place(length: float, force: float) -> None:
     assert set(placed.values()) == {"everywhere"}
 
 
+@pytest.mark.parametrize(("length", "force"), SIZES)
+def test_largest_errors_are_where_they_are_of_any_size(length: float, force: float) -> None:
+    """A pin that lies on one side of a play of a ten thousandth."""
+
+    def largest(length: float, force: float) -> dict[str, tuple[float, str]]:
+        data = model(slider_crank(offset=0.0), friction=0.1)
+        data["joints"]["B"] |= {"pin": {"radius": 0.005, "clearance": 1e-5}, "seat": {"xi": 0.5}}
+        summary = trunnion.analyse(Mechanism(**sized(data, length, force)), 12).trunnion.summary
+        return {
+            item.name: (item.value, item.place) for item in summary if "error_max" in item.name or "change" in item.name
+        }
+
+    expected, units = largest(1.0, 1.0), {"point_error_max": length, "A.effort_change_max": force * length}
+    assert len(expected) == 3
+    for name, (value, place) in largest(length, force).items():
+        assert place == expected[name][1]
+        assert value == pytest.approx(expected[name][0] * units.get(name, length), rel=1e-9)
+
+
 def test_joints_in_one_point_have_loads_and_losses() -> None:
     """The pins of a Cardan joint lie in one point, whose places are nothing but rounding."""
     axis, across = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]

@@ -154,7 +154,8 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
                 yield course.figure(key, f"{what} of {name}", top, unit, "maximum")
         yield from _bearing(cycle, course, i, name)
         if PAIRS[kind].guided:
-            ends = [course.extreme("joint_slide", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
+            valid = course.valid
+            ends = [course.extreme("joint_slide", i, sign=sign, panels=valid, unit="m") for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
                 stroke, note = ends[0].value - ends[1].value, course.note
                 yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
@@ -233,10 +234,10 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         return
     run = cycle.run
 
-    def largest(variable: str, i: int) -> Place | None:
-        return course.extreme(variable, i, of=magnitude, panels=course.valid)
+    def largest(variable: str, i: int, unit: str) -> Place | None:
+        return course.extreme(variable, i, of=magnitude, panels=course.valid, unit=unit)
 
-    points = [(top, k) for k in range(len(run.system.points)) if (top := largest("point_error", k)) is not None]
+    points = [(top, k) for k in range(len(run.system.points)) if (top := largest("point_error", k, "m")) is not None]
     if points:
         highest = max(top.value for top, _ in points) * (1 - ALIKE)
         top, k = next(pair for pair in points if pair[0].value >= highest)  # of equal ones the first
@@ -246,13 +247,14 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
-        if (error := largest(f"joint_{what}_error", i)) is not None:
+        if (error := largest(f"joint_{what}_error", i, unit)) is not None:
             name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
             yield course.figure(name, subject, error, unit, "largest magnitude")
     for i, joint in enumerate(run.system.mechanism.drivers):
         kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
         subject, name = f"change of the drive {kind} of {joint} by the errors", f"{joint}.effort_change_max"
-        ends = [course.extreme("drive_effort_change", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
+        variable, valid = "drive_effort_change", course.valid
+        ends = [course.extreme(variable, i, sign=sign, panels=valid, unit=unit) for sign in (1.0, -1.0)]
         change = max(filter(None, ends), key=lambda end: abs(end.value), default=None)
         if change is not None:
             yield course.figure(name, subject, change, unit, "largest magnitude")

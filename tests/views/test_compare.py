@@ -96,7 +96,7 @@ def test_what_was_set_stands_beside_the_courses_of_its_condition():
         assert len(set(own.values())) > 1
         assert columns[name].tolist() == [own[one] for one in columns["condition"]]
     drawn = draw.figure(result, Plot("", [course(result, 0, 3, 62)]))  # as in a report
-    assert drawn.subfigs[0].get_suptitle() == str(result["condition"].values[3])
+    assert str(result["condition"].values[3]) in drawn.subfigs[0].get_suptitle()
 
 
 @cache

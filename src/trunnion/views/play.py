@@ -35,7 +35,7 @@ def tables(result: xr.Dataset) -> list[Table]:
         effects, deviations = (result[f"extreme_{key}"].values[i] for key in ("worst_case", "deviation"))
         total = float(np.sum(effects))
         if not np.isfinite(total):
-            parts.append(Table(f"{name}: no value at {where}", HEAD, []))
+            parts.append(Table(f"{name}: no value", HEAD, []))
             continue
         rows = [[joint, _play(result["radius"].values[j]), quantity(float(effect), unit),
                  f"{100 * effect / total:.1f} %" if total > 0 else NONE]

@@ -333,7 +333,7 @@ class Sketch:
         """The unit that lengths are written in: that most often in the model, or one that suits its size."""
         units = LENGTH.findall(str([self.entries.get("dimensions"), self.entries.get("links")]))
         suiting = "mm" if len(self.places) < 2 or 1e-4 <= self.size <= 10.0 else "m" if self.size > 1.0 else "µm"
-        return max(set(units), key=units.count) if units else suiting
+        return max(units, key=units.count) if units else suiting
 
     def length(self, value: float) -> str:
         """A length as it is written: no finer than it was drawn, but one that is much smaller keeps three figures."""

@@ -27,7 +27,7 @@ def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> N
 def test_a_press_that_stalls_is_an_error(program: Run) -> None:
     code, out, err = program("simulate", PRESS, "--set", "force=1000kN", "--set", "breakdown_effort=20Nm", "--time=2s")
     assert code == 1
-    assert "error: driver O stalls at 1.129 s, at 235.6°, with the motor on: 87.69 N m act on it" in out + err
+    assert "error: driver O stalls at 1.129 s, at 235.6°, with the motor of O on: 87.69 N m act on it" in out + err
     assert "flywheel" in out + err
 
 

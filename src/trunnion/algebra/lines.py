@@ -28,7 +28,6 @@ from trunnion.algebra.vector import (
     Matrix3,
     Vector3,
     cross,
-    divided,
     dot,
     plus,
     product,
@@ -217,14 +216,15 @@ def log(pose: Matrix3) -> Vector3:
         scalar, largest = xp.where(larger, rows[k][0], scalar), xp.where(larger, rows[k][k], largest)
         vector = where(larger, rows[k][1:], vector)
     xp = namespace(scalar, *vector)
-    size = xp.sqrt(scalar * scalar + dot(vector, vector))
-    size = xp.where(np.less(primal(scalar), 0), -size, size)
-    cosine, vector = scalar / size, divided(vector, size)
+    sign = xp.where(np.less(primal(scalar), 0), -1.0, 1.0)
+    scalar, vector = sign * scalar, scaled(sign, vector)
     square = dot(vector, vector)
-    near = np.less(primal(square), SMALL_SINE)
+    size = xp.sqrt(scalar * scalar + square)
+    share = square / (size * size)
+    near = np.less(primal(share), SMALL_SINE)
     sine = xp.sqrt(xp.where(near, 1.0, square))
-    few = xp.where(near, square, 0.0)
-    return scaled(2 * xp.where(near, _sum(ARCSINE, few), xp.arctan2(sine, cosine) / sine), vector)
+    few = xp.where(near, share, 0.0)
+    return scaled(2 * xp.where(near, _sum(ARCSINE, few) / size, xp.arctan2(sine, scalar) / sine), vector)
 
 
 def _sum(coefficients: list[float], x: Number) -> Number:

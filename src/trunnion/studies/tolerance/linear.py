@@ -224,18 +224,20 @@ class ToleranceStudy:
             window = positions.windows[measure.name]
             parts = [Dual(part.real[:, window.index], part.dual[:, window.index])
                      for part in walked[measure.name].parts]  # fmt: skip
-            curve, course = parts[0].real[0], self._course(measure, parts)
+            curve = parts[0].real[0]
             if measure.name in lines:
-                curve, slope = self.effects.slopes(reads[measure.name].shown, window.time.shape)
-                curve, course = curve[0], FirstOrder(self.effects, self.effects.without_noise(slope))
-            elif measure.kind == "path_error" or measure.of_attitude(system) or measure.of.against:
+                shown, slope = self.effects.slopes(reads[measure.name].shown, window.time.shape)
+                curves.append(shown[0])
+                courses.append(FirstOrder(self.effects, self.effects.without_noise(slope)))
+                continue
+            if measure.kind == "path_error" or measure.of_attitude(system) or measure.of.against:
                 curve = 0.0 * curve
             elif len(parts) > 1:
                 curve = parts[0].real[0] / np.where(parts[1].real[0] > 0, parts[1].real[0], np.nan)
             elif measure.turning(system):
                 curve = near(curve, self.many.angle(measure, window.time))
             curves.append(curve)
-            courses.append(course)
+            courses.append(self._course(measure, parts))
         return Table(positions, curves, courses, walked[self.measures[0].name].status)
 
     @cached_property

@@ -158,7 +158,7 @@ _RIG = (
         "rig/comparison.py",
         "residual = measured - model\n",
         "residual = model - measured\n",
-        ("tests/rig/test_compare.py", "-k", "offset"),
+        ("tests/rig/test_compare.py", "-k", "acts_from"),
     ),
     Fault(
         "month-before-day",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechanisms_parts import Data, body, prismatic, revolute, slide
+from mechanisms_parts import Data, body, joined, slide
 
 
 def geared_five_bar() -> Data:
@@ -15,13 +15,7 @@ def geared_five_bar() -> Data:
             "right": body({"D": [0, 0], "C": [1.2, 0]}, 3, 1.0),
             "wheel": body({"E": [0, 0], "D": [0.25, 0]}, 4, 0.25),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "left"),
-            "C": revolute("left", "right"),
-            "D": revolute("right", "wheel"),
-            "E": revolute("wheel", "ground"),
-        },
+        "joints": joined("ground -A- crank -B- left -C- right -D- wheel -E- ground"),
         # the wheel is the first link of E: its rotation against the ground is minus that of the joint
         "gears": {"mesh": {"joints": ["A", "E"], "ratio": 0.5, "phase": 0.4}},
         "drivers": {"A": {"speed": 3.0, "start": 0.3}},
@@ -40,13 +34,7 @@ def planet_drive() -> Data:
             "rod": body({"C": [0, 0], "D": [1.4, 0]}, 3, 1.0),
             "slider": body({"D": [0, 0], "P": slide(0.0, 0.0)}, 4, 0.2),
         },
-        "joints": {
-            "A": revolute("ground", "carrier"),
-            "B": revolute("carrier", "planet"),
-            "C": revolute("planet", "rod"),
-            "D": revolute("rod", "slider"),
-            "P": prismatic("ground", "slider"),
-        },
+        "joints": joined("ground -A- carrier -B- planet -C- rod -D- slider, ground =P= slider"),
         "gears": {"ring": {"joints": ["A", "B"], "ratio": -3.0, "phase": 0.2, "pressure_angle": 0.4}},
         "drivers": {"A": {"speed": 2.0}},
         "loads": {"work": {"link": "slider", "at": "D", "force": [-25.0, 0.0]}},
@@ -64,13 +52,7 @@ def geared_loop() -> Data:
             "right": body({"C": [0, 0], "D": [0.7, 0]}, 3, 0.7),
             "wheel": body({"D": [0, 0], "E": [0.5, 0]}, 4, 0.5),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "left"),
-            "C": revolute("left", "right"),
-            "D": revolute("right", "wheel"),
-            "E": revolute("wheel", "ground"),
-        },
+        "joints": joined("ground -A- crank -B- left -C- right -D- wheel -E- ground"),
         "gears": {"pair": {"joints": ["C", "D"], "ratio": 0.6, "phase": -0.5}},
         "drivers": {"A": {"speed": 4.0, "start": 0.35}},
         "loads": {"work": {"link": "left", "at": "P", "moment": 3.0, "force": [4.0, -9.0]}},
@@ -90,16 +72,10 @@ def rocker_train() -> Data:
             "rod": body({"F": [0, 0], "G": [1.0, 0]}, 1, 1.0),
             "slider": body({"G": [0, 0], "P": slide(0.0, 0.0)}, 2, 0.2),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "coupler"),
-            "C": revolute("coupler", "rocker"),
-            "D": revolute("ground", "rocker"),
-            "E": revolute("ground", "arm"),
-            "F": revolute("arm", "rod"),
-            "G": revolute("rod", "slider"),
-            "P": prismatic("ground", "slider"),
-        },
+        "joints": joined(
+            "ground -A- crank -B- coupler -C- rocker, ground -D- rocker, ground -E- arm -F- rod -G- slider, "
+            "ground =P= slider"
+        ),
         "gears": {"train": {"joints": ["D", "E"], "ratio": 0.7, "phase": -2.5, "teeth": False}},
         "drivers": {"A": {"speed": 5.0}},
         "loads": {"work": {"link": "slider", "at": "G", "force": [-10.0, -20.0]}},
@@ -120,13 +96,7 @@ def rack_on_rocker() -> Data:
             "swivel": body({"D": [0, 0], "S": slide(0.0, 0.05), "B": [0.02, -0.04]}, 1, 0.2),
             "pinion": body({"B": [0, 0]}, 3, 0.1),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "T": revolute("crank", "bar"),
-            "S": prismatic("bar", "swivel"),
-            "D": revolute("ground", "swivel"),
-            "B": revolute("swivel", "pinion"),
-        },
+        "joints": joined("ground -A- crank -T- bar =S= swivel, ground -D- swivel -B- pinion"),
         "gears": {"mesh": {"joints": ["S", "B"], "radius": 0.06, "phase": 0.02, "pressure_angle": 0.3}},
         "drivers": {"A": {"speed": 3.0, "start": 0.4}},
         "loads": {"work": {"link": "pinion", "moment": 4.0}},
@@ -146,16 +116,7 @@ def rack_in_loop() -> Data:
             "rack": body({"S": slide(0.0, 0.0), "T": [-0.3, 0.05]}, 2, 0.4),
             "rod": body({"T": [0, 0], "U": [0.7, 0]}, 1, 0.7),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "left"),
-            "C": revolute("left", "right"),
-            "D": revolute("right", "wheel"),
-            "E": revolute("wheel", "ground"),
-            "S": prismatic("left", "rack"),
-            "T": revolute("rack", "rod"),
-            "U": revolute("rod", "ground"),
-        },
+        "joints": joined("ground -A- crank -B- left -C- right -D- wheel -E- ground, left =S= rack -T- rod -U- ground"),
         "gears": {"mesh": {"joints": ["C", "S"], "radius": 0.1, "phase": 0.05}},
         "drivers": {"A": {"speed": 4.0, "start": 0.2}},
         "loads": {"work": {"link": "left", "at": "S", "force": [4.0, -9.0]}},
@@ -173,13 +134,7 @@ def screwed_strut() -> Data:
             "spindle": body({"S": slide(-0.3, 0.0), "C": [0.2, 0]}, 3, 0.4),
             "wheel": body({"W": [0, 0]}, 1, 0.05),
         },
-        "joints": {
-            "A": revolute("ground", "arm"),
-            "C": revolute("arm", "spindle"),
-            "D": revolute("ground", "tube"),
-            "S": prismatic("tube", "spindle"),
-            "W": revolute("tube", "wheel"),
-        },
+        "joints": joined("ground -A- arm -C- spindle, ground -D- tube =S= spindle, tube -W- wheel"),
         "gears": {"screw": {"joints": ["W", "S"], "lead": 0.006, "phase": 0.3}},
         "drivers": {"W": {"speed": 20.0, "range": [0.0, 120.0]}},
         "loads": {"work": {"link": "arm", "at": "C", "force": [30.0, -200.0]}},

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import trunnion
 from brief import brief
 from geared import geared_five_bar, geared_loop, planet_drive, rack_in_loop, rack_on_rocker, rocker_train, screwed_strut
-from mechanisms_parts import Data, body, prismatic, revolute, slide
+from mechanisms_parts import Data, body, joined, prismatic, revolute, slide
 from trunnion import Mechanism
 from trunnion.groups.general import General
 from trunnion.groups.tree import OUTER, GroupJoint
@@ -56,12 +56,7 @@ def four_bar(ab: float = 0.3, bc: float = 0.9, cd: float = 0.7, ad: float = 1.0,
             "coupler": body({"B": [0, 0], "C": [bc, 0], "E": [0.4 * bc, 0.3 * bc]}, 2, bc),
             "rocker": body({"D": [0, 0], "C": [cd, 0]}, 3, cd),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "coupler"),
-            "C": revolute("coupler", "rocker"),
-            "D": revolute("ground", "rocker"),
-        },
+        "joints": joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker"),
         "drivers": {"A": {"speed": 4.0}},
         "loads": {
             "push": {"link": "coupler", "at": "E", "force": [12.0, -30.0]},
@@ -79,12 +74,7 @@ def slider_crank(r: float = 0.3, length: float = 1.0, offset: float = 0.1) -> Da
             "rod": body({"B": [0, 0], "P": [length, 0]}, 2, length),
             "piston": body({"P": [0, 0], "C": slide(0.05, 0), "H": [0.1, 0.08]}, 3, r),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "rod"),
-            "P": revolute("rod", "piston"),
-            "C": prismatic("ground", "piston"),
-        },
+        "joints": joined("ground -A- crank -B- rod -P- piston, ground =C= piston"),
         "drivers": {"A": {"speed": -6.0}},
         "loads": {"gas": {"link": "piston", "at": "H", "force": [-50.0, 4.0]}},
         "assembly": {"P": [r + length, offset]},
@@ -100,12 +90,7 @@ def inverted_slider_crank() -> Data:
             "block": body({"B": [0, 0], "S": slide(0.02, 0.01, 0.1)}, 2, 0.2),
             "arm": body({"D": [0, 0], "S": slide(0.03, 0, np.pi / 2 + 0.1), "T": [0, 1.5]}, 3, 1.0),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("block", "crank"),
-            "S": prismatic("arm", "block"),
-            "D": revolute("ground", "arm"),
-        },
+        "joints": joined("ground -A- crank, block -B- crank, arm =S= block, ground -D- arm"),
         "drivers": {"A": {"speed": 3.0, "start": 0.2}},
         "loads": {"cut": {"link": "arm", "at": "T", "force": [20.0, 5.0]}},
         "assembly": {"S": [0.3, 0.0], "arm.T": [0.5, 0.8]},
@@ -118,11 +103,7 @@ def watt_six_bar() -> Data:
     data["links"]["rocker"]["points"]["F"] = [0.5, 0.3]
     data["links"]["rod"] = body({"F": [0, 0], "H": [1.0, 0]}, 4)
     data["links"]["output"] = body({"G": [0, 0], "H": [0.8, 0]}, 5)
-    data["joints"] |= {
-        "F": revolute("rod", "rocker"),
-        "H": revolute("rod", "output"),
-        "G": revolute("output", "ground"),
-    }
+    data["joints"] |= joined("rod -F- rocker, rod -H- output -G- ground")
     data["loads"]["work"] = {"link": "output", "moment": 9.0, "useful": True}
     data["assembly"]["H"] = [2.0, 1.0]
     return data
@@ -134,11 +115,7 @@ def stephenson_six_bar() -> Data:
     data["links"]["ground"]["points"]["G"] = [0.2, 1.4]
     data["links"]["rod"] = body({"E": [0, 0], "H": [0.8, 0]}, 4)
     data["links"]["output"] = body({"G": [0, 0], "H": [0.7, 0]}, 5)
-    data["joints"] |= {
-        "E": revolute("coupler", "rod"),
-        "H": revolute("rod", "output"),
-        "G": revolute("ground", "output"),
-    }
+    data["joints"] |= joined("coupler -E- rod -H- output, ground -G- output")
     data["loads"]["work"] = {"link": "output", "moment": -9.0}
     data["assembly"]["H"] = [0.9, 1.3]
     return data
@@ -155,15 +132,9 @@ def class_three() -> Data:
             "rod3": body({"H": [0, 0], "R": [0.8944, 0]}, 4, 0.8),
             "plate": body({"P": [0, 0], "Q": [0.6, 0], "R": [0.25, 0.5]}, 5, 0.4),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "rod1"),
-            "P": revolute("rod1", "plate"),
-            "Q": revolute("plate", "rod2"),
-            "R": revolute("rod3", "plate"),
-            "G": revolute("ground", "rod2"),
-            "H": revolute("rod3", "ground"),
-        },
+        "joints": joined(
+            "ground -A- crank -B- rod1 -P- plate -Q- rod2, rod3 -R- plate, ground -G- rod2, rod3 -H- ground"
+        ),
         "drivers": {"A": {"speed": 5.0}},
         "loads": {"push": {"link": "plate", "at": "R", "force": [7.0, -20.0]}, "turn": {"link": "rod3", "moment": 3.0}},
         "assembly": {"P": [0.7, 0.6], "Q": [1.3, 0.6], "R": [0.95, 1.1]},
@@ -179,13 +150,7 @@ def five_bar() -> Data:
             "rod1": body({"B": [0, 0], "C": [0.9, 0]}, 3, 0.9),
             "rod2": body({"D": [0, 0], "C": [0.8, 0], "T": [1.0, 0.1]}, 4, 0.8),
         },
-        "joints": {
-            "A": revolute("ground", "left"),
-            "E": revolute("right", "ground"),
-            "B": revolute("left", "rod1"),
-            "C": revolute("rod2", "rod1"),
-            "D": revolute("right", "rod2"),
-        },
+        "joints": joined("ground -A- left, right -E- ground, left -B- rod1, rod2 -C- rod1, right -D- rod2"),
         "drivers": {"A": {"speed": 2.0}, "E": {"speed": -4.0, "start": 0.4}},
         "loads": {"tool": {"link": "rod2", "at": "T", "force": [-5.0, 11.0]}},
         "assembly": {"C": [0.5, 0.8]},
@@ -202,13 +167,7 @@ def excavator() -> Data:
             "rod": body({"C": [0.05, 0], "S": slide(-0.5, 0)}, 3, 0.4),
             "stick": body({"K": [0, 0], "T": [1.1, 0.1]}, 4, 0.8),
         },
-        "joints": {
-            "A": revolute("ground", "boom"),
-            "B": revolute("ground", "barrel"),
-            "C": revolute("boom", "rod"),
-            "S": prismatic("barrel", "rod"),
-            "K": revolute("stick", "boom"),
-        },
+        "joints": joined("ground -A- boom, ground -B- barrel, boom -C- rod, barrel =S= rod, stick -K- boom"),
         "drivers": {"S": {"speed": 0.05, "range": [0.0, 0.2]}, "K": {"speed": -0.2, "range": [1.9, 1.1]}},
         "loads": {"dig": {"link": "stick", "at": "T", "force": [-80.0, 120.0]}},
         "assembly": {"C": [0.8, 0.4]},
@@ -243,12 +202,7 @@ def scotch_yoke() -> Data:
             "block": body({"B": [0, 0], "S": slide(0.01, 0, 1.4)}, 2, 0.1),
             "yoke": body({"S": slide(0, 0.1, 1.4), "G": slide(0.5, 0, 0.0)}, 3, 0.4),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "block"),
-            "S": prismatic("block", "yoke"),
-            "G": prismatic("ground", "yoke"),
-        },
+        "joints": joined("ground -A- crank -B- block =S= yoke, ground =G= yoke"),
         "drivers": {"A": {"speed": 2.5}},
         "loads": {"work": {"link": "yoke", "at": "S", "force": [-15.0, 2.0]}},
         "assembly": {"S": [0.25, 0.0]},
@@ -264,12 +218,7 @@ def elliptic_bar() -> Data:
             "bar": body({"P": [0, 0], "Q": [0.9, 0]}, 2, 0.9),
             "slider": body({"Q": [0, 0], "Y": slide(0.05, 0.1, 1.3)}, 3, 0.2),
         },
-        "joints": {
-            "X": prismatic("ground", "ram"),
-            "P": revolute("ram", "bar"),
-            "Q": revolute("bar", "slider"),
-            "Y": prismatic("ground", "slider"),
-        },
+        "joints": joined("ground =X= ram -P- bar -Q- slider, ground =Y= slider"),
         "drivers": {"X": {"speed": 0.3, "range": [0.05, 0.5]}},
         "loads": {"work": {"link": "slider", "at": "Q", "force": [1.0, -25.0]}},
         "assembly": {"Q": [0.2, 0.8]},
@@ -285,12 +234,7 @@ def tangent_drive() -> Data:
             "block": body({"S": slide(0, 0), "P": [0.02, 0.01]}, 2, 0.1),
             "slider": body({"P": [0, 0.05], "G": slide(0.03, 0, 1.5)}, 3, 0.2),
         },
-        "joints": {
-            "A": revolute("ground", "arm"),
-            "S": prismatic("block", "arm"),
-            "P": revolute("block", "slider"),
-            "G": prismatic("slider", "ground"),
-        },
+        "joints": joined("ground -A- arm, block =S= arm, block -P- slider =G= ground"),
         "drivers": {"A": {"speed": 0.7, "range": [-0.6, 0.6]}},
         "loads": {"work": {"link": "slider", "at": "P", "force": [2.0, -40.0]}},
         "assembly": {"P": [0.5, -0.3]},

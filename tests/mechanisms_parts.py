@@ -17,6 +17,22 @@ def prismatic(*links: str) -> Data:
     return {"type": "prismatic", "links": list(links)}
 
 
+def joined(chains: str, **more: Data) -> Data:
+    """Joints along chains of links, such as "ground -A- crank -B:spherical- rod, ground =S= ram": = for a slide.
+
+    more: what else is stated of a joint, by its name.
+    """
+    joints: Data = {}
+    for chain in chains.split(", "):
+        link, *steps = chain.split()
+        for joint, after in zip(steps[::2], steps[1::2], strict=True):
+            name, _, kind = joint[1:-1].partition(":")
+            kind = kind or ("prismatic" if joint[0] == "=" else "revolute")
+            joints[name] = {"type": kind, "links": [link, after], **more.get(name, {})}
+            link = after
+    return joints
+
+
 def slide(x: float, y: float, angle: float = 0.0) -> Data:
     """Point of a prismatic joint with the direction of its slide."""
     return {"at": [x, y], "axis": [float(np.cos(angle)), float(np.sin(angle))]}
@@ -42,11 +58,6 @@ def plunger(r: float, rod: float, pins: Data) -> Data:
             "rod": {"points": {"A": [0, 0], "B": [rod, 0]}},
             "ram": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
         },
-        "joints": {
-            "O": {"type": "revolute", "links": ["ground", "crank"], **pins.get("O", {})},
-            "A": {"type": "revolute", "links": ["crank", "rod"], **pins.get("A", {})},
-            "B": {"type": "revolute", "links": ["rod", "ram"], **pins.get("B", {})},
-            "S": {"type": "prismatic", "links": ["ground", "ram"]},
-        },
+        "joints": joined("ground -O- crank -A- rod -B- ram, ground =S= ram", **pins),
         "assembly": {"B": [0.09, 0]},
     }

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import optimize
 
+from mechanisms_parts import joined
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, element, point, rotation, unrolled
 
 __all__ = ["MODELS", "Drawn", "cardan", "chain", "closed", "draw", "floating", "frame_of", "random_rotation", "rssr"]
@@ -216,12 +217,8 @@ def rssr(start: float = 0.0, friction: float = 0.0) -> Drawn:
             "rocker": {"points": {"D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "C": [c, 0, s4]},
                        **mass(0.15, [0.03, 0.001, 0.01], (3e-5, 9e-5, 1e-4))},
         },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "B": {"type": "spherical", "links": ["crank", "rod"], "pin": {"radius": 0.006}},
-            "C": {"type": "spherical", "links": ["rod", "rocker"], "pin": {"radius": 0.007}},
-            "D": {"type": "revolute", "links": ["ground", "rocker"]},
-        },
+        "joints": joined("ground -A- crank -B:spherical- rod -C:spherical- rocker, ground -D- rocker",
+                         B={"pin": {"radius": 0.006}}, C={"pin": {"radius": 0.007}}),
         "drivers": {"A": {"speed": 30.0, "start": start}},
         "loads": {"brake": {"joint": "D", "resisting_torque": 2.0, "useful": True}},
     }  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from mechanisms_parts import joined
 from playing import LANKARANI, SPEED
 from trunnion.model.mechanism import Mechanism
 
@@ -88,12 +89,7 @@ def cardan() -> Mechanism:
             "second": {"points": {"B": other, "C": {"at": [0.2, 0, 0], **bearing}},
                        **heavy},
         },
-        joints={
-            "A": {"type": "revolute", "links": ["ground", "first"]},
-            "B": {"type": "universal", "links": ["first", "second"]},
-            "C": {"type": "cylindrical", "links": ["second", "ground"], "pin": pin,
-                  "contact": SOFT},
-        },
+        joints=joined("ground -A- first -B:universal- second -C:cylindrical- ground", C={"pin": pin, "contact": SOFT}),
         drivers={"A": {"speed": 100}},
     )  # fmt: skip
 
@@ -113,13 +109,11 @@ def on_a_plate() -> Mechanism:
             "coupler": {"points": {"B": on(0), "C": on(0.09), "E": on(0.04)}, "centre": [0.05, 0.01, 0.002], **heavy},
             "rocker": {"points": {"D": on(0), "C": on(0.07)}, "centre": [0.03, 0, 0], **heavy},
         },
-        joints={
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "B": {"type": "revolute", "links": ["crank", "coupler"], "pin": LOOSE, "contact": SOFT},
-            "C": {"type": "revolute", "links": ["rocker", "coupler"], "pin": LOOSE, "contact": SOFT},
-            "D": {"type": "revolute", "links": ["ground", "rocker"]},
-            "E": {"type": "planar", "links": ["ground", "coupler"]},
-        },
+        joints=joined(
+            "ground -A- crank -B- coupler, rocker -C- coupler, ground -D- rocker, ground -E:planar- coupler",
+            B={"pin": LOOSE, "contact": SOFT},
+            C={"pin": LOOSE, "contact": SOFT},
+        ),
         drivers={"A": {"speed": 20, "start": "60 deg"}},
         assembly={"D": "100 deg"},
     )
@@ -149,15 +143,14 @@ def dropped() -> Mechanism:
             "shaft": {"points": {"A": on(0, 0, 0), "B": on(0.05, 0.3, 0)}, "mass": MASS, "centre": CENTRE.tolist(),
                       "inertia": inertia},
         },
-        joints={
-            "M": {"type": "revolute", "links": ["ground", "wheel"]},
-            "B": {"type": "cylindrical", "links": ["wheel", "shaft"], "pin": {"clearance": 1, "length": 0.01},
-                  "contact": {"restitution": 0.5, "stiffness": 1e5, "exponent": 1}},
-            "A": {"type": "revolute", "links": ["shaft", "ground"],
-                  "pin": {"radius": 0.01, "clearance": WIDTH, "length": 2 * HALF, "end_float": 2 * FLOAT},
-                  "contact": {"restitution": RESTITUTION, "law": "lankarani-nikravesh", "stiffness": STIFFNESS},
-                  "friction": FRICTION},
-        },
+        joints=joined(
+            "ground -M- wheel -B:cylindrical- shaft -A- ground",
+            B={"pin": {"clearance": 1, "length": 0.01},
+               "contact": {"restitution": 0.5, "stiffness": 1e5, "exponent": 1}},
+            A={"pin": {"radius": 0.01, "clearance": WIDTH, "length": 2 * HALF, "end_float": 2 * FLOAT},
+               "contact": {"restitution": RESTITUTION, "law": "lankarani-nikravesh", "stiffness": STIFFNESS},
+               "friction": FRICTION},
+        ),
         drivers={"M": {"speed": 60}},
     )  # fmt: skip
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mechanisms_parts import joined
 from trunnion.model.mechanism import Mechanism
 
 
@@ -69,12 +70,7 @@ def slider_crank(friction: float | dict[str, Any] = 0.1, **more: Any) -> Mechani
             "piston": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 0.6},
         },
         "ground": "frame",
-        "joints": {
-            "O": {"type": "revolute", "links": ["frame", "crank"]},
-            "P": {"type": "revolute", "links": ["crank", "rod"]},
-            "Q": {"type": "revolute", "links": ["rod", "piston"]},
-            "S": {"type": "prismatic", "links": ["frame", "piston"], "guide": {"length": 0.05}},
-        },
+        "joints": joined("frame -O- crank -P- rod -Q- piston, frame =S= piston", S={"guide": {"length": 0.05}}),
         "joint_defaults": {"pin": {"radius": 0.01}, **({"friction": friction} if friction else {})},
         "drivers": {
             "O": {"speed": 100, "motor": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3}}
@@ -103,10 +99,7 @@ def pulled_mass() -> Mechanism:
             "mass": {"points": {"S": _slide()}, "mass": 1},
             "end": {"points": {"E": _slide(), "P": [1, 0]}},
         },
-        joints={
-            "S": {"type": "prismatic", "links": ["ground", "mass"], "guide": {"length": 0.1}, "friction": law},
-            "E": {"type": "prismatic", "links": ["ground", "end"]},
-        },
+        joints=joined("ground =S= mass, ground =E= end", S={"guide": {"length": 0.1}, "friction": law}),
         drivers={
             "S": {"range": [0, 2.5], "speed": 0.1, "free": True, "initial": {"coordinate": 0, "speed": 0}},
             "E": {"range": [0, 2.5], "speed": 0.1},
@@ -125,10 +118,7 @@ def mass_on_a_belt() -> Mechanism:
             "belt": {"points": {"B": _slide(), "S": _slide()}},
             "mass": {"points": {"S": _slide()}, "mass": 1},
         },
-        joints={
-            "B": {"type": "prismatic", "links": ["ground", "belt"]},
-            "S": {"type": "prismatic", "links": ["belt", "mass"], "guide": {"length": 0.1}, "friction": law},
-        },
+        joints=joined("ground =B= belt =S= mass", S={"guide": {"length": 0.1}, "friction": law}),
         drivers={
             "B": {"range": [0, 0.5], "speed": 0.1},
             "S": {"range": [0, -0.5], "speed": -0.1, "free": True, "initial": {"coordinate": 0, "speed": 0}},

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanisms_parts import Data, prismatic, revolute, slide
+from mechanisms_parts import Data, joined, revolute, slide
 from trunnion import Mechanism
 from trunnion.studies.tolerance.inputs import inputs_of
 from trunnion.studies.tolerance.linear import ToleranceStudy, study
@@ -37,11 +37,7 @@ def clutch(**options: Any) -> Mechanism:
             "strut": {"points": {"O": [0, 0], "P": [0, "e - c"]}},
             "roller": {"points": {"P": [0, 0], "G": {"at": [0, 0], "axis": [1, 0]}}},
         },
-        "joints": {
-            "O": revolute("frame", "strut"),
-            "P": revolute("strut", "roller"),
-            "G": prismatic("frame", "roller"),
-        },
+        "joints": joined("frame -O- strut -P- roller, frame =G= roller"),
         "measures": {"wedge": {"angle": "strut"}},
         "assembly": {"P": ["-5 mm", "39 mm"]},
         **options,
@@ -74,12 +70,7 @@ def fourbar(tolerance: str = "±0.05 mm", loaded: bool = False, speed: float = 4
             "coupler": link({"B": [0, 0], "C": ["l3", 0]}, *bodies[1]),
             "rocker": link({"D": [0, 0], "C": ["l4", 0]}, *bodies[2]),
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "coupler"),
-            "C": revolute("coupler", "rocker"),
-            "D": revolute("ground", "rocker"),
-        },
+        "joints": joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker"),
         "drivers": {"A": {"speed": speed}},
         "tolerances": dict.fromkeys(FOURBAR, tolerance),
         "measures": {"angle": {"angle": "rocker", "at": "60 deg"}},
@@ -117,12 +108,7 @@ def slider_crank(offset: float = 0.0, **options: Any) -> Mechanism:
             "rod": {"points": {"B": [0, 0], "P": ["l", 0]}},
             "piston": {"points": {"P": [0, 0], "C": slide(0, 0)}},
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": revolute("crank", "rod"),
-            "P": revolute("rod", "piston"),
-            "C": prismatic("ground", "piston"),
-        },
+        "joints": joined("ground -A- crank -B- rod -P- piston, ground =C= piston"),
         "drivers": {"A": {"speed": 5.0}},
         "tolerances": {"r": "±0.02 mm", "l": "±0.05 mm", "e": "±0.1 mm"},
         "measures": {"x": {"point": "piston.P", "axis": "x", "at": "60 deg"}},

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brief import brief
+from mechanisms_parts import joined
 from mechanisms_space import chain, rssr
 from trunnion import Mechanism, MechanismError, Status, analyse
 from trunnion.solve.run import prepare
@@ -138,11 +139,7 @@ def test_a_wedge() -> None:
             "wedge": {"points": {"A": level, "B": slope}},
             "follower": {"points": {"B": slope, "C": up}},
         },
-        joints={
-            "A": {"type": "prismatic", "links": ["ground", "wedge"]},
-            "B": {"type": "prismatic", "links": ["wedge", "follower"]},
-            "C": {"type": "prismatic", "links": ["ground", "follower"]},
-        },
+        joints=joined("ground =A= wedge =B= follower, ground =C= follower"),
         drivers={"A": {"range": [-0.1, 0.1], "speed": 0.1}},
         loads={"work": {"link": "follower", "at": "C", "force": [0, 0, "-100 N - 500 N/m * drive"]}},
     )

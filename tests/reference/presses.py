@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanisms_parts import Data, prismatic, revolute, slide
+from mechanisms_parts import Data, joined, slide
 from trunnion import Mechanism
 
 __all__ = ["arm", "press"]
@@ -23,12 +23,7 @@ def press(dimensions: Data | None = None, **sections: Any) -> Mechanism:
             "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
             "ram": {"points": {"Q": [0, 0], "S": slide(0, 0)}},
         },
-        "joints": {
-            "O": revolute("frame", "crank"),
-            "P": revolute("crank", "rod"),
-            "Q": revolute("rod", "ram"),
-            "S": {**prismatic("frame", "ram"), "guide": {"length": 0.03}},
-        },
+        "joints": joined("frame -O- crank -P- rod -Q- ram, frame =S= ram", S={"guide": {"length": 0.03}}),
         "drivers": {"O": {"speed": "60 rpm", "start": "180 deg"}},
         "assembly": {"Q": [0.17, 0]},
     }

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brief import brief
+from mechanisms_parts import joined
 from timed import ANTIPARALLELOGRAM, DELTOID, PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, analyse, simulate
 from trunnion.solve.run import prepare
@@ -228,10 +229,7 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
     data["links"]["ground"]["points"]["G"] = [float(d + 3.0), 0.0]
     data["links"]["rod"] = {"points": {"E": [0, 0], "F": [3.0, 0]}}
     data["links"]["last"] = {"points": {"G": [0, 0], "F": [4.0, 0]}}
-    data["joints"] |= {
-        "E": {"type": "revolute", "links": ["coupler", "rod"]}, "F": {"type": "revolute", "links": ["rod", "last"]},
-        "G": {"type": "revolute", "links": ["ground", "last"]},
-    }  # fmt: skip
+    data["joints"] |= joined("coupler -E- rod -F- last, ground -G- last")  # fmt: skip
     data["assembly"]["rod"] = "way-1"
     return Mechanism(**data)
 

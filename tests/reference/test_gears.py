@@ -12,7 +12,7 @@ import trunnion
 from brief import brief
 from geared import geared_five_bar, geared_loop, planet_drive, rocker_train, screwed_strut
 from mechanisms import Data, analyse, build, model, positions_of
-from mechanisms_parts import prismatic, revolute, slide
+from mechanisms_parts import joined, prismatic, revolute, slide
 from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare
 
@@ -28,10 +28,7 @@ def test_two_wheels() -> None:
             "pinion": {"points": {"A": [0, 0]}},
             "wheel": {"points": {"E": [0, 0]}},
         },
-        "joints": {
-            "A": revolute("ground", "pinion"),
-            "E": revolute("ground", "wheel"),
-        },
+        "joints": joined("ground -A- pinion, ground -E- wheel"),
         "gears": {"mesh": {"joints": ["A", "E"], "ratio": "-1/2", "pressure_angle": "25 deg"}},
         "drivers": {"A": {"speed": 10.0}},
         "loads": {"brake": {"joint": "E", "resisting_torque": torque}},
@@ -128,13 +125,7 @@ def steering(driver: Data, gear: Data | None = None) -> Data:
             "rod": {"points": {"T": [0, 0], "A": [0.285, 0]}},
             "knuckle": {"points": {"K": [0, 0], "A": [-0.02, -0.14]}},
         },
-        "joints": {
-            "P": revolute("frame", "pinion"),
-            "S": prismatic("frame", "rack"),
-            "T": revolute("rack", "rod"),
-            "A": revolute("rod", "knuckle"),
-            "K": revolute("frame", "knuckle"),
-        },
+        "joints": joined("frame -P- pinion, frame =S= rack -T- rod -A- knuckle, frame -K- knuckle"),
         "gears": {"mesh": {"joints": ["P", "S"], "radius": RADIUS, **(gear or {})}},
         "drivers": driver,
         "loads": {"tyre": {"joint": "K", "resisting_torque": TORQUE}},
@@ -265,10 +256,7 @@ def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Dat
             "wheel": {"points": {"W": [0, 0]}, "inertia": 1e-3},
             "nut": {"points": {"S": slide(0, 0)}, "mass": 2.0},
         },
-        "joints": {
-            "W": {**revolute("ground", "wheel"), "friction": friction, "pin": {"radius": MEAN}},
-            "S": prismatic("ground", "nut"),
-        },
+        "joints": joined("ground -W- wheel, ground =S= nut", W={"friction": friction, "pin": {"radius": MEAN}}),
         "gears": {"screw": {"joints": ["W", "S"], "lead": lead}},
         "drivers": driver,
         **more,

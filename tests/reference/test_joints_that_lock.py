@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.sparse import csc_matrix
 
+from mechanisms_parts import joined
 from timed import wheel
 from trunnion.dynamics.simulate import simulate
 from trunnion.model.mechanism import Mechanism
@@ -50,10 +51,11 @@ def blocks(force: str, upper: float = 0.0, gravity: float = 0.0, above: float = 
             "low": {"points": {"A": AXIS, "B": AXIS}, "mass": LOW, "centre": [0, ARM]},
             "high": {"points": {"B": AXIS}, "mass": HIGH},
         },
-        joints={
-            "A": {"type": "prismatic", "links": ["ground", "low"], "friction": F, "guide": {"length": GUIDE}},
-            "B": {"type": "prismatic", "links": ["low", "high"], "friction": upper, "guide": {"length": 20}},
-        },
+        joints=joined(
+            "ground =A= low =B= high",
+            A={"friction": F, "guide": {"length": GUIDE}},
+            B={"friction": upper, "guide": {"length": 20}},
+        ),
         drivers={
             name: {"speed": 1, "range": [-50, 50], "free": True, "initial": {"coordinate": 0, "speed": speed}}
             for name, speed in (("A", 1.0), ("B", above))
@@ -141,10 +143,11 @@ def rod(torque: float, friction: float = 0.0, rough: float = ROUGH) -> Mechanism
             "slider": {"points": {"A": AXIS, "B": [0, 0]}, "mass": SLIDER},
             "rod": {"points": {"B": [0, 0]}, "mass": ROD, "inertia": ROD * HALF**2 / 3, "centre": [HALF, 0]},
         },
-        joints={
-            "A": {"type": "prismatic", "links": ["ground", "slider"], "friction": rough, "guide": {"length": 5}},
-            "B": {"type": "revolute", "links": ["slider", "rod"], "pin": {"radius": 0.02}, "friction": friction},
-        },
+        joints=joined(
+            "ground =A= slider -B- rod",
+            A={"friction": rough, "guide": {"length": 5}},
+            B={"pin": {"radius": 0.02}, "friction": friction},
+        ),
         drivers={
             "A": {"speed": 1, "range": [-5, 5], "free": True, "initial": {"coordinate": 0, "speed": 1}},
             "B": {"speed": 1, "free": True, "initial": {"coordinate": ANGLE, "speed": 0}},
@@ -338,10 +341,11 @@ def stacked() -> Mechanism:
             "low": {"points": {"A": axis, "B": axis}, "mass": LOWER},
             "high": {"points": {"B": axis}, "mass": UPPER},
         },
-        joints={
-            "A": {"type": "prismatic", "links": ["ground", "low"], "friction": 0.05, "guide": {"length": 20}},
-            "B": {"type": "prismatic", "links": ["low", "high"], "friction": ROUGHNESS, "guide": {"length": 20}},
-        },
+        joints=joined(
+            "ground =A= low =B= high",
+            A={"friction": 0.05, "guide": {"length": 20}},
+            B={"friction": ROUGHNESS, "guide": {"length": 20}},
+        ),
         drivers={
             name: {"speed": 1, "range": [-1, 1], "free": True, "initial": {"coordinate": start, "speed": 0}}
             for name, start in (("A", 0.4), ("B", 0))
@@ -383,10 +387,7 @@ def pendulum() -> Mechanism:
             "upper": {"points": {"A": [0, 0], "B": [LENGTH, 0]}, **bars["upper"]},
             "lower": {"points": {"B": [0, 0]}, **bars["lower"]},
         },
-        joints={
-            "A": {"type": "revolute", "links": ["ground", "upper"]},
-            "B": {"type": "revolute", "links": ["upper", "lower"]},
-        },
+        joints=joined("ground -A- upper -B- lower"),
         joint_defaults={"pin": {"radius": PIN}, "friction": ROUGHNESS},
         drivers={
             name: {"speed": 1, "free": True, "initial": {"coordinate": start, "speed": 0}}

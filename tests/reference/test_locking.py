@@ -22,10 +22,10 @@ from mechanisms import (
     four_bar,
     model,
     prismatic,
-    revolute,
     slide,
     slider_crank,
 )
+from mechanisms_parts import joined
 from mechanisms_space import cardan, rssr
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status, locking
@@ -51,12 +51,10 @@ def pushed_slider(coefficient: float, load: float = -LOAD) -> Mechanism:
             "rod": {"points": {"P": [0, 0], "Q": [0.5, 0]}},
             "slider": {"points": {"Q": [0, ARM], "G": slide(0, 0)}},
         },
-        "joints": {
-            "X": prismatic("ground", "ram"),
-            "P": revolute("ram", "rod"),
-            "Q": revolute("rod", "slider"),
-            "G": {**prismatic("ground", "slider"), "friction": coefficient, "guide": {"length": GUIDE}},
-        },
+        "joints": joined(
+            "ground =X= ram -P- rod -Q- slider, ground =G= slider",
+            G={"friction": coefficient, "guide": {"length": GUIDE}},
+        ),
         "drivers": {"X": {"speed": 0.1, "range": [0.0, 0.2]}},
         "loads": {"work": {"link": "slider", "at": "G", "force": [load, 0.0]}},
         "assembly": {"Q": [0.6, ARM]},
@@ -361,15 +359,10 @@ def ram(coefficient: float, aside: float = 0.0) -> Mechanism:
             "block": {"points": {"B": [0, 0], "F": axis}},
             "slide": {"points": {"E": [0, 0], "G": axis}},
         },
-        joints={
-            "A": revolute("ground", "crank"),
-            "C": revolute("ground", "lever"),
-            "D": revolute("lever", "rod"),
-            "F": prismatic("lever", "block"),
-            "B": revolute("crank", "block"),
-            "G": prismatic("ground", "slide"),
-            "E": revolute("rod", "slide"),
-        },
+        joints=joined(
+            "ground -A- crank, ground -C- lever -D- rod, lever =F= block, crank -B- block, ground =G= slide, "
+            "rod -E- slide"
+        ),
         assembly={"D": [0, 0.1], "F": 0.11, "B": [0, 0.03], "E": [-0.1, 0.1]},
         drivers={"A": {"speed": 6.0, "start": 1.6}},
         loads={

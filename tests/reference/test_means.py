@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms_parts import Data, revolute
+from mechanisms_parts import Data, joined, revolute
 from trunnion import Mechanism, analyse
 from trunnion.cycle.summary import balance
 from trunnion.errors import Finding, Status
@@ -33,12 +33,7 @@ PRESS: dict[str, Any] = {  # of docs/how-to/model-file.md
         "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
         "ram": {"points": {"Q": [0, 0], "S": {"at": [0, "offset"], "axis": [1, 0]}}},
     },
-    "joints": {
-        "O": {"type": "revolute", "links": ["frame", "crank"]},
-        "P": {"type": "revolute", "links": ["crank", "rod"]},
-        "Q": {"type": "revolute", "links": ["rod", "ram"]},
-        "S": {"type": "prismatic", "links": ["frame", "ram"], "guide": {"length": "30 mm"}},
-    },
+    "joints": joined("frame -O- crank -P- rod -Q- ram, frame =S= ram", S={"guide": {"length": "30 mm"}}),
     "joint_defaults": {"pin": {"radius": "12 mm"}, "friction": 0.2},
     "drivers": {"O": {"speed": "60 rpm"}},
     "loads": {"work": {"joint": "S", "resisting_force": "1 kN", "useful": True}},

@@ -11,6 +11,7 @@ import pytest
 import trunnion
 from brief import brief
 from mechanisms import four_bar
+from mechanisms_parts import joined
 from trunnion import Mechanism, Status
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.solve.run import prepare
@@ -31,12 +32,7 @@ def press(drivers: dict[str, Any], friction: float = 0.1, **more: Any) -> Mechan
                 "rod": {"points": {"P": [0, 0], "Q": [L, 0]}, "mass": 1.0, "centre": [L / 2, 0], "inertia": 3e-3},
                 "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 5.0},
             },
-            "joints": {
-                "O": {"type": "revolute", "links": ["frame", "crank"]},
-                "P": {"type": "revolute", "links": ["crank", "rod"]},
-                "Q": {"type": "revolute", "links": ["rod", "ram"]},
-                "S": {"type": "prismatic", "links": ["frame", "ram"], "guide": {"length": 0.15}},
-            },
+            "joints": joined("frame -O- crank -P- rod -Q- ram, frame =S= ram", S={"guide": {"length": 0.15}}),
             "joint_defaults": {"pin": {"radius": 0.025}, "friction": friction},
             "drivers": drivers,
             "loads": {"cut": {"joint": "S", "resisting_force": "5 kN", "useful": True}},

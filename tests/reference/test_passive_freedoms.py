@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from brief import brief
+from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError, analyse
 
 Array = NDArray[np.float64]
@@ -195,12 +196,7 @@ def test_a_pad_on_a_plane_under_a_ball() -> None:
             "pad": {"points": {"P": {"at": [0.03, 0, 0], "axis": [0, 0, 1]}, "Q": [0, 0.01, 0.02]}},
             "lever": {"points": lever},
         },
-        joints={
-            "C": {"type": "revolute", "links": ["ground", "crank"]},
-            "P": {"type": "planar", "links": ["crank", "pad"]},
-            "Q": {"type": "spherical", "links": ["pad", "lever"]},
-            "V": {"type": "revolute", "links": ["ground", "lever"]},
-        },
+        joints=joined("ground -C- crank -P:planar- pad -Q:spherical- lever, ground -V- lever"),
         drivers={"C": {"speed": 1.0, "range": [-0.4, 0.5]}},
         loads={"turn": {"link": "lever", "moment": [0, -5.0, 0]}},
         assembly={"Q": [0.05, 0.15, 0.12]},

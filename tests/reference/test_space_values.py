@@ -10,6 +10,7 @@ import xarray as xr
 
 import trunnion
 from brief import brief
+from mechanisms_parts import joined
 from reference.maximal_space import Array, Data, Frame, rotation, unrolled
 from spatial_numbers import apart
 from trunnion.algebra.dual import Dual, functions, parts, primal, spatial
@@ -94,12 +95,7 @@ def rssr(hint: float, **driver: Any) -> Data:
             "rod": {"points": {"B": [0, 0, 0], "C": ["b", 0, 0]}},
             "rocker": {"points": {"D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "C": ["c", 0, "s4"]}},
         },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "B": {"type": "spherical", "links": ["crank", "rod"]},
-            "C": {"type": "spherical", "links": ["rod", "rocker"]},
-            "D": {"type": "revolute", "links": ["ground", "rocker"]},
-        },
+        "joints": joined("ground -A- crank -B:spherical- rod -C:spherical- rocker, ground -D- rocker"),
         "drivers": {"A": {"speed": SPEED, **driver}},
         "assembly": {"D": hint},
     }  # fmt: skip

@@ -18,7 +18,10 @@ Data = dict[str, Any]
 TURN = 2 * np.pi
 Row = tuple[Any, Any, Any]  # numbers, or one for each of several motions
 
-__all__ = ["Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "point", "rotation", "turned", "unrolled"]
+__all__ = [
+    "Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "in_planes", "point", "raised", "rotation",
+    "turned", "unrolled",
+]  # fmt: skip
 
 
 class Frame(NamedTuple):
@@ -99,13 +102,54 @@ def unrolled(data: Data) -> Data:
     return {**{key: part for key, part in data.items() if key != "loop"}, "links": links, "joints": joints}
 
 
+def raised(data: Data) -> Data:
+    """A planar model in space: z across the plane, pins along z; inertia about x and y is that of a thin plate."""
+
+    def lifted(stated: Any, joint: Data | None) -> Data:
+        at = [*(stated["at"] if isinstance(stated, dict) else stated), 0.0]
+        if joint and joint["type"] == "prismatic":
+            return {"at": at, "axis": [*stated["axis"], 0.0], "x": [0, 0, -1]}  # y to the left of the slide
+        return {"at": at, "axis": [0, 0, 1], "x": [1, 0, 0]} if joint else {"at": at}
+
+    links: Data = {}
+    for name, link in data["links"].items():
+        points = {at: lifted(stated, data["joints"].get(at)) for at, stated in link["points"].items()}
+        links[name] = {**link, "points": points}
+        if "centre" in link:
+            links[name]["centre"] = [*link["centre"], 0.0]
+        if "inertia" in link:
+            links[name]["inertia"] = {"xx": link["inertia"] / 2, "yy": link["inertia"] / 2, "zz": link["inertia"]}
+    loads = {name: dict(load) for name, load in data.get("loads", {}).items()}
+    for load in loads.values():
+        load |= {"force": [*load["force"], 0.0]} if "force" in load else {}
+        load |= {"moment": [0.0, 0.0, load["moment"]]} if "moment" in load else {}
+    hints = {name: [*hint, 0.0] if isinstance(hint, list) else hint for name, hint in data.get("assembly", {}).items()}
+    gravity = [*data["gravity"], 0.0]
+    return {**data, "space": "spatial", "gravity": gravity, "links": links, "loads": loads, "assembly": hints}
+
+
+def in_planes(data: Data) -> Data:
+    """A planar model in space, as what this module, but no other, can move: a planar pair holds every link in its
+    plane, and a joint holds what is left of its freedoms there."""
+    data = raised(data)
+    kinds = {"revolute": "pin", "prismatic": "slot"}
+    joints = {name: {**joint, "type": kinds[joint["type"]]} for name, joint in data["joints"].items()}
+    upright = point(REST.frame)
+    links = {name: {**link, "points": dict(link["points"])} for name, link in data["links"].items()}
+    for name in [name for name in links if name != "ground"]:
+        joints[f"plane of {name}"] = {"type": "planar", "links": ["ground", name], "friction": 0.0}
+        for link in ("ground", name):
+            links[link]["points"][f"plane of {name}"] = upright
+    return {**data, "links": links, "joints": joints}
+
+
 def point(frame: Frame) -> Data:
     """A point of a model, of a frame in its link."""
     return {"at": list(frame.place), "axis": list(frame.axes[:, 2]), "x": list(frame.axes[:, 0])}
 
 
 # rows of a joint: gaps along axes of the first element; pairs (axis of the first, axis of the second) that stay square
-GAPS = {"prismatic": (0, 1), "cylindrical": (0, 1), "planar": (2,), "helical": (0, 1)}
+GAPS = {"prismatic": (0, 1), "cylindrical": (0, 1), "planar": (2,), "helical": (0, 1), "pin": (0, 1), "slot": (1,)}
 ALIGNED = ((0, 2), (1, 2))
 SQUARE: dict[str, tuple[tuple[int, int], ...]] = {
     "revolute": ALIGNED,
@@ -116,7 +160,10 @@ SQUARE: dict[str, tuple[tuple[int, int], ...]] = {
     "helical": ALIGNED,
     "planar": ALIGNED,
     "fixed": (*ALIGNED, (0, 1)),
+    "pin": (),
+    "slot": ((1, 2),),
 }
+SLIDING = ("prismatic", "slot")  # a drive moves them along z, the others about it
 
 
 class Linkage:
@@ -170,9 +217,9 @@ class Linkage:
             rest = [t - lead * s for t, s in zip(turned(one, two), gap(one, two, 2), strict=True)]
             found.append((wrapped(rest[0]), rest[1], rest[2]))
         if name in drive:
-            coordinate = gap(one, two, 2) if kind == "prismatic" else turned(one, two)
+            coordinate = gap(one, two, 2) if kind in SLIDING else turned(one, two)
             off = [a - b for a, b in zip(coordinate, drive[name], strict=True)]
-            found.append((off[0] if kind == "prismatic" else wrapped(off[0]), off[1], off[2]))
+            found.append((off[0] if kind in SLIDING else wrapped(off[0]), off[1], off[2]))
         return found
 
     def placed_by(self, guess: Mapping[str, Frame], drive: Mapping[str, Drive]) -> dict[str, Frame]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from reference.maximal_space import Array, Data, Drive, Frame, Motion, element, point, rotation
-from reference.newton_euler_space import Solution
+from reference.newton_euler import Solution
 from reference.space_oracle import Oracle
 
 __all__ = ["Settled", "moved", "settle"]

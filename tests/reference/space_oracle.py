@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference.maximal_space import Array, Data, Frame, Linkage, Motion, gap, turned
-from reference.newton_euler_space import Body, Joint, Load, Rubbing, Solution, solve, solve_with_friction
+from reference.maximal_space import SLIDING, Array, Data, Frame, Linkage, Motion, gap, turned
+from reference.newton_euler import Body, Joint, Load, Rubbing, Solution, solve, solve_with_friction
 
 __all__ = ["Oracle", "Slip", "merged"]
 
@@ -79,7 +79,7 @@ class Oracle(Linkage):
             free = self.line(motions, link) if link in self.free else None
             inertia = self.inertia(link, motion.frame)
             mass = float(data.get("mass", 0.0))
-            found[link] = Body(mass, inertia, centre, acceleration, motion.spin, motion.spin_rate, loads, free)
+            found[link] = Body(mass, inertia, centre, acceleration, motion.spin_rate, motion.spin, loads, free)
         return found
 
     def load(self, load: Data, motion: Motion) -> Load:
@@ -127,7 +127,7 @@ class Oracle(Linkage):
         length = float(pin.get("bearing", pin.get("length", np.inf)))
         if kind == "spherical":
             return [against(name, lambda F, M: f * np.linalg.norm(F), spin=r * unit(slip.spin))]
-        if kind == "prismatic":
+        if kind in SLIDING:
             long, width = float(guide["length"]), float(guide.get("width", np.inf))
             return [
                 against(

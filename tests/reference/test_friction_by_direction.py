@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import trunnion
 from brief import brief
 from mechanisms import Array, Data, build, four_bar, positions_of, slider_crank
-from mechanisms_parts import prismatic, slide
+from mechanisms_parts import joined, slide
 from trunnion import Mechanism, read
 from trunnion.results.tables.cycle import positions
 from trunnion.solve.bristles import _chained
@@ -22,6 +22,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 
 FORWARD, BACKWARD = 0.1, 0.35
+BY_DIRECTION = {"coefficient": FORWARD, "backward": BACKWARD}
 G = 9.81
 
 
@@ -30,10 +31,6 @@ def with_friction(data: Data, joint: str, friction: Any) -> Mechanism:
     changed = copy.deepcopy(data)
     changed["joints"][joint]["friction"] = friction
     return Mechanism(**changed)
-
-
-def by_direction() -> Data:
-    return {"coefficient": FORWARD, "backward": BACKWARD}
 
 
 @pytest.mark.spread(1)
@@ -46,7 +43,7 @@ def test_each_way_is_a_run_with_its_coefficient(name: str, joint: str, engine: A
     data = trunnion.read(f"examples/{name}.yaml").data()
     runs = [
         trunnion.analyse(with_friction(data, joint, friction), steps=60, engine=engine)
-        for friction in (by_direction(), FORWARD, BACKWARD)
+        for friction in (BY_DIRECTION, FORWARD, BACKWARD)
     ]
     rate = sum(runs[0][f"joint_{motion}_velocity"].sel(joint=joint).values for motion in ("rotation", "slide"))
     ahead = rate > 0
@@ -61,7 +58,7 @@ def test_each_way_is_a_run_with_its_coefficient(name: str, joint: str, engine: A
 
 def test_at_rest_each_bound_has_its_own() -> None:
     """A block of 2 kg that turns round: between −μ₋ m g and μ₊ m g."""
-    data = block(0.0, by_direction())
+    data = block(0.0, BY_DIRECTION)
     data["drivers"] = {"S": {"law": "harmonic", "mean": 0.1, "amplitude": 0.1, "period": 1.0}}
     found = brief(Mechanism(**data), steps=8)
     still = int(np.argmin(np.abs(found["joint_slide_velocity"].values[0])))
@@ -70,66 +67,50 @@ def test_at_rest_each_bound_has_its_own() -> None:
     assert (low, high) == pytest.approx((-BACKWARD * 2 * G, FORWARD * 2 * G), rel=1e-9)
 
 
-def block(slope: float, friction: Any) -> Data:
+def block(slope: float, friction: Any, joint: str = "S") -> Data:
     """A block of 2 kg on a slope, rad, up along x; a long guide carries no moment."""
+    point = {"points": {joint: slide(0, 0)}}
     return {
         "gravity": [-G * np.sin(slope), -G * np.cos(slope)],
-        "links": {"ground": {"points": {"S": slide(0, 0)}}, "block": {"points": {"S": slide(0, 0)}, "mass": 2.0}},
-        "joints": {"S": {**prismatic("ground", "block"), "guide": {"length": 0.5}, "friction": friction}},
+        "links": {"ground": point, "block": {**point, "mass": 2.0}},
+        "joints": joined(f"ground ={joint}= block", **{joint: {"guide": {"length": 0.5}, "friction": friction}}),
     }
 
 
-@pytest.mark.parametrize("friction", [(0.1, 0.35), (0.1, 0.8)])
-def test_a_block_thrown_up_a_slope(friction: tuple[float, float]) -> None:
-    """Up with μ₊ against it, down with μ₋, or it stays where μ₋ holds: times and way by the closed form."""
-    slope, speed = np.radians(30), 2.0
-    data = block(slope, {"coefficient": friction[0], "backward": friction[1]})
-    data["drivers"] = {"S": thrown(speed)}
+THROWN = {"S": (2.0, 0.1, 0.35), "R": (1.5, 0.2, 0.8)}  # speed, m/s, and both coefficients
+
+
+@pytest.mark.parametrize("joints", ["S", "R", pytest.param("SR", marks=pytest.mark.slow)])
+def test_blocks_thrown_up_a_slope(joints: str) -> None:
+    """Up with μ₊ against it, down with μ₋, or it stays where tan of the slope is below μ₋: times and way by the closed
+    form, of several blocks each for itself."""
+    slope = np.radians(30)
+    data: Data = {**block(slope, None), "links": {"ground": {"points": {}}}, "joints": {}, "drivers": {}}
+    for name in joints:
+        speed, forward, backward = THROWN[name]
+        alone = block(slope, {"coefficient": forward, "backward": backward}, name)
+        data["links"]["ground"]["points"] |= alone["links"]["ground"]["points"]
+        data["links"][f"block-{name}"] = alone["links"]["block"]
+        data["joints"][name] = {**alone["joints"][name], "links": ["ground", f"block-{name}"]}
+        initial = {"coordinate": 0, "speed": speed}
+        data["drivers"][name] = {"range": [-9, 9], "speed": 0.1, "free": True, "initial": initial}
     found = trunnion.simulate(Mechanism(**data), duration=1.2, steps=120)
-    assert found["joint_slide"].sel(joint="S").values == pytest.approx(
-        on_slope(found, slope, speed, friction), abs=1e-7
-    )
-
-
-def thrown(speed: float) -> Data:
-    return {"range": [-9, 9], "speed": 0.1, "free": True, "initial": {"coordinate": 0, "speed": speed}}
-
-
-def on_slope(found: Any, slope: float, speed: float, friction: tuple[float, float]) -> Any:
-    """Where a block is, m: it stays where tan of the slope is below the coefficient of the way down."""
-    stays = np.tan(slope) < friction[1]
-    up = G * (np.sin(slope) + friction[0] * np.cos(slope))
-    down = G * (np.sin(slope) - friction[1] * np.cos(slope))
-    time, top = found["time"].values, speed / up
-    after = 0.0 if stays else 0.5 * down * (time - top) ** 2
-    return np.where(time <= top, speed * time - 0.5 * up * time**2, 0.5 * speed**2 / up - after)
-
-
-@pytest.mark.slow
-def test_two_blocks_of_which_one_stays() -> None:
-    """Of several freedoms each joint sticks and slips for itself."""
-    slope, cases = np.radians(30), {"S": (2.0, (0.1, 0.35)), "R": (1.5, (0.2, 0.8))}
-    data = block(slope, None)
-    data["links"]["other"] = {"points": {"R": slide(0, 0)}, "mass": 3.0}
-    data["links"]["ground"]["points"]["R"] = slide(0, 1)
-    data["joints"]["R"] = {**data["joints"]["S"], "links": ["ground", "other"]}
-    for joint, (_, (forward, backward)) in cases.items():
-        data["joints"][joint] = {**data["joints"][joint], "friction": {"coefficient": forward, "backward": backward}}
-    data["drivers"] = {joint: thrown(speed) for joint, (speed, _) in cases.items()}
-    found = trunnion.simulate(Mechanism(**data), duration=1.2, steps=120)
-    for joint, (speed, friction) in cases.items():
-        way = on_slope(found, slope, speed, friction)
-        assert found["joint_slide"].sel(joint=joint).values == pytest.approx(way, abs=1e-7), joint
+    for name in joints:
+        speed, forward, backward = THROWN[name]
+        up = G * (np.sin(slope) + forward * np.cos(slope))
+        down = max(G * (np.sin(slope) - backward * np.cos(slope)), 0.0)
+        time, top = found["time"].values, speed / up
+        back = 0.5 * speed**2 / up - 0.5 * down * (time - top) ** 2
+        way = np.where(time <= top, speed * time - 0.5 * up * time**2, back)
+        assert found["joint_slide"].sel(joint=name).values == pytest.approx(way, abs=1e-7), name
 
 
 def test_a_loaded_roller() -> None:
     """Torque arm · W of a wheel under the weight W, which needs no radius of a pin."""
-    wheel = {
+    wheel: Data = {
         "gravity": [0, -G],
         "links": {"ground": {"points": {"A": [0, 0]}}, "wheel": {"points": {"A": [0, 0]}, "mass": 50.0}},
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "wheel"], "friction": {"law": "rolling", "arm": 5e-4}}
-        },
+        "joints": joined("ground -A- wheel", A={"friction": {"law": "rolling", "arm": 5e-4}}),
         "drivers": {"A": {"speed": 1.0}},
     }
     found = brief(Mechanism(**wheel), steps=4)
@@ -194,36 +175,13 @@ def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
     assert (max(beyond) > 1e-4) == inside
 
 
-def overhung(length: float, **more: Any) -> Mechanism:
-    """A shaft about z that carries a mass of 2 kg, 0.3 m beyond the middle of its bearing; gravity along −y."""
-    return Mechanism(
-        space="spatial",
-        gravity=[0, -G, 0],
-        links={
-            "ground": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}},
-            "shaft": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}, "mass": 2.0, "centre": [0, 0, 0.3]},
-        },
-        joints={"A": {"type": "revolute", "links": ["ground", "shaft"], "pin": {"radius": 0.01, "bearing": length}}},
-        drivers={"A": {"speed": 1.0}},
-        measures={"end": {"end_load": "A", "as": "maximum"}},
-        **more,
-    )
-
-
 def test_a_guide_in_the_plane() -> None:
-    """A slider 0.4 m long that carries 100 N, 0.5 m beyond its middle: 100 N·(0.5/0.4 + 1/2) on the nearer end."""
-    model = Mechanism(
-        gravity=[0, 0],
-        links={
-            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
-            "slider": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "E": [0.5, 0]}},
-        },
-        joints={"S": {"type": "prismatic", "links": ["ground", "slider"], "guide": {"length": 0.4}}},
-        drivers={"S": {"speed": 1.0, "range": [0, 0.2]}},
-        loads={"weight": {"link": "slider", "at": "E", "force": [0, -100]}},
-        measures={"end": {"end_load": "S", "as": "maximum"}},
-    )
-    assert float(trunnion.analyse(model, steps=4).measure_figure[0]) == pytest.approx(175.0, rel=1e-12)
+    """A slider 0.5 m long that carries 100 N, 0.6 m beyond its middle: 100 N·(0.6/0.5 + 1/2) on the nearer end."""
+    data = {**block(0.0, 0.0), "gravity": [0, 0], "drivers": {"S": {"speed": 1.0, "range": [0, 0.2]}}}
+    data["links"]["block"]["points"]["E"] = [0.6, 0]
+    data["loads"] = {"weight": {"link": "block", "at": "E", "force": [0, -100]}}
+    data["measures"] = {"end": {"end_load": "S", "as": "maximum"}}
+    assert float(trunnion.analyse(Mechanism(**data), steps=4).measure_figure[0]) == pytest.approx(170.0, rel=1e-12)
 
 
 @pytest.mark.slow
@@ -246,8 +204,17 @@ def sizes(found: Any, joint: str) -> Any:
 
 
 def test_the_table_has_both_ends_and_the_pressure() -> None:
-    """Levers: m g (1/2 ± a/L); the end that bears more, over half of the projected area, is the pressure."""
-    found = trunnion.analyse(overhung(0.1), steps=4)
+    """A mass 0.3 m beyond the middle of a bearing of 0.1 m: m g (1/2 ± a/L); the end that bears more, over half of the
+    projected area, is the pressure."""
+    axis = {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}}
+    shaft = Mechanism(
+        space="spatial",
+        gravity=[0, -G, 0],
+        links={"ground": axis, "shaft": {**axis, "mass": 2.0, "centre": [0, 0, 0.3]}},
+        joints=joined("ground -A- shaft", A={"pin": {"radius": 0.01, "bearing": 0.1}}),
+        drivers={"A": {"speed": 1.0}},
+    )
+    found = trunnion.analyse(shaft, steps=4)
     both = 2 * G * np.array([3.5, 2.5])
     assert np.sort(sizes(found, "A")[:, 0])[::-1] == pytest.approx(both, rel=1e-12)
     assert found["pin_pressure"].values == pytest.approx(np.full((1, 4), both[0] / (0.02 * 0.05)), rel=1e-12)
@@ -323,76 +290,49 @@ LUGRE = {
 }  # fmt: skip
 
 
-def state_by_integrator(run: Any, joint: str, law: dict[str, Any], turns: int) -> tuple[Array, Array]:
-    """(time, deflection) over the last of some turns from rest, by Radau, the speed asked of the walk itself."""
-    lever = run.values.get(f"joints.{joint}.pin.radius", 1.0)
-    duration = run.cycle.duration
-
-    fine = np.linspace(0, duration, 4001)
-    speeds = np.ravel(lever * run.solve(fine).walk.speed(joint))
-
-    def v_of(time: float) -> float:
-        return float(np.interp(time % duration, fine, speeds))
-
-    def curve(v: float) -> float:
-        if law["law"] == "dahl":
-            return float(law["coefficient"])
-        peak = law["static"] - law["coefficient"]
-        return float(law["coefficient"] + peak * np.exp(-((v / law["stribeck_speed"]) ** 2)))
-
-    def rate(time: float, z: Array) -> list[float]:
-        v = v_of(time)
-        return [v - law["stiffness"] * abs(v) / curve(v) * z[0]]
-
-    wanted = (turns - 1) * duration + np.linspace(0, duration, 90, endpoint=False)
-    found = solve_ivp(
-        rate, (0, turns * duration), [0.0], "Radau", wanted, rtol=1e-8, atol=1e-13, max_step=duration / 400
-    )
-    return wanted - (turns - 1) * duration, found.y[0]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("data", "joint", "law"), [(four_bar(), "D", DAHL), (slider_crank(), "P", LUGRE)])
 def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, Any]) -> None:
     """In a rocker's pin and a slider's guide, both of which turn back twice a turn, once the start is forgotten."""
     run = prepare(build(data, friction=law))
-    time, expected = state_by_integrator(run, joint, law, 2)
-    found = run._past[joint].at(time)
-    largest = np.abs(expected).max()
-    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * largest)
+    duration, lever = run.cycle.duration, run.values.get(f"joints.{joint}.pin.radius", 1.0)
+    fine = np.linspace(0, duration, 4001)
+    speeds = np.ravel(lever * run.solve(fine).walk.speed(joint))
+    peak = law.get("static", law["coefficient"]) - law["coefficient"]
+
+    def rate(time: float, z: Array) -> list[float]:
+        v = float(np.interp(time % duration, fine, speeds))
+        curve = law["coefficient"] + peak * np.exp(-((v / law.get("stribeck_speed", 1.0)) ** 2))
+        return [v - law["stiffness"] * abs(v) / curve * z[0]]
+
+    time = np.linspace(0, duration, 90, endpoint=False)  # of the second turn from rest
+    expected = solve_ivp(
+        rate, (0, 2 * duration), [0.0], "Radau", duration + time, rtol=1e-8, atol=1e-13, max_step=duration / 400
+    ).y[0]
+    np.testing.assert_allclose(run._past[joint].at(time), expected, rtol=0, atol=2e-4 * np.abs(expected).max())
 
 
 def test_state_is_periodic_and_settled_whatever_the_steps() -> None:
-    law = LUGRE
-    run = prepare(build(four_bar(), friction=law))
+    run = prepare(build(four_bar(), friction=LUGRE))
     history, duration = run._past["D"], run.cycle.duration
     time = np.linspace(0, 1, 37) * duration
     np.testing.assert_allclose(history.at(time + 3 * duration), history.at(time), rtol=1e-9, atol=1e-15)
-    few, many = positions_of(four_bar(), 18, friction=law), positions_of(four_bar(), 36, friction=law)
+    few, many = (positions_of(four_bar(), steps, friction=LUGRE) for steps in (18, 36))
     np.testing.assert_allclose(many["drive_effort"].values[:, ::2], few["drive_effort"].values, rtol=1e-12)
 
 
 def test_dahl_from_rest() -> None:
     """Over a range the bristles start at rest: F = f N (1 − exp(−κ x/f)), exactly."""
-    data = {
-        "links": {
-            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
-            "block": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 2.0},
-        },
-        "joints": {"S": {"type": "prismatic", "links": ["ground", "block"]}},
-        "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}},
-    }
-    result = positions_of(data, 41, friction=DAHL, guide=0.3)
+    data = {**block(0.0, DAHL), "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}}}
+    result = brief(Mechanism(**data), 41)
     slide = result["joint_slide"].sel(joint="S").values
-    expected = 0.12 * 2.0 * 9.81 * (1 - np.exp(-4e3 * slide / 0.12))
+    expected = 0.12 * 2.0 * G * (1 - np.exp(-4e3 * slide / 0.12))
     np.testing.assert_allclose(-result["friction_force"].sel(joint="S").values, expected, rtol=1e-9, atol=1e-12)
 
 
 def test_lugre_slides_steadily_by_stribecks_curve() -> None:
     """A fast drive leaves no trace of the bristles between reversals: the pin A always turns one way."""
-    steady = {**LUGRE, "law": "stribeck"}
-    for key in ("stiffness", "damping"):
-        del steady[key]
+    steady = {key: number for key, number in LUGRE.items() if key not in ("stiffness", "damping")} | {"law": "stribeck"}
     bristles, curve = positions_of(four_bar(), 24, friction=LUGRE), positions_of(four_bar(), 24, friction=steady)
     ratios = [
         one["friction_torque"].sel(joint="A").values / np.hypot(*one["reaction_force"].sel(joint="A").values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,8 @@ def affine(run: Any, data: Data) -> tuple[list[str], Array, Array]:
         start.append(zero)
         rows = []
         for name in names:
-            one = newton_euler.Joint(**{**vars(joints[name]), "friction": 1.0})
-            rows.append(reactions(i, {**joints, name: one}) - zero)
+            rubbed = replace(joints[name], friction=newton_euler.wrenches(joints[name])[1])
+            rows.append(reactions(i, {**joints, name: rubbed}) - zero)
         slope.append(rows)
     return names, np.array(start), np.array(slope)
 

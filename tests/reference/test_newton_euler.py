@@ -7,6 +7,7 @@ velocity, acceleration and force could not cancel; friction is given from the re
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,138 +27,74 @@ def times(run: Run) -> Array:
     return (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
 
 
-def link_poses(run: Run, time: Array) -> dict[str, tuple[Array, Array, Array]]:
-    """Origin and angle of every moving link."""
-    walk = run.solve(time).walk
-    ground = run.system.mechanism.fixed_link
-    return {
-        link: tuple(
-            np.broadcast_to(n, np.shape(time))
-            for n in (motion.frame.x, motion.frame.y, np.arctan2(motion.frame.s, motion.frame.c))
-        )
-        for link, motion in walk.motions.items()
-        if link != ground
-    }
+def here(number: Any, i: int) -> float:
+    """The number of one of the positions."""
+    return float(np.broadcast_to(number, (STEPS,))[i])
 
 
-def accelerations(run: Run, time: Array) -> dict[str, tuple[Array, Array, Array]]:
-    """Second derivatives of the poses of the centres of mass, eighth-order central differences of positions."""
+def accelerations(run: Run, time: Array) -> dict[str, Array]:
+    """Second derivatives (x, y, angle) of the poses of the centres of mass, of moving links, by eighth-order central
+    differences of positions."""
     h = STEP * run.cycle.duration
     weights = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560]) / h**2
-    stencil = time + h * np.arange(-4, 5)[:, None]
-    found = {}
-    sampled = [link_poses(run, row) for row in stencil]
-    for link in sampled[0]:
+    walks = [run.solve(row).walk for row in time + h * np.arange(-4, 5)[:, None]]
+    second = {}
+    for link in set(walks[0].motions) - {run.system.mechanism.fixed_link}:
         cx, cy = run.system.centre(run.values, link)
-        angle = np.unwrap(np.array([poses[link][2] for poses in sampled]), axis=0)
-        x = np.array([poses[link][0] for poses in sampled]) + np.cos(angle) * cx - np.sin(angle) * cy
-        y = np.array([poses[link][1] for poses in sampled]) + np.sin(angle) * cx + np.cos(angle) * cy
-        found[link] = tuple(np.tensordot(weights, n, axes=1) for n in (x, y, angle))
-    return found
+        frames = [walk.motions[link].frame for walk in walks]
+        x, y, c, s = (np.array([np.broadcast_to(frame[k], time.shape) for frame in frames]) for k in range(4))
+        poses = x + c * cx - s * cy, y + s * cx + c * cy, np.unwrap(np.arctan2(s, c), axis=0)
+        second[link] = np.array([np.tensordot(weights, n, axes=1) for n in poses])
+    return second
 
 
-def bodies_at(run: Run, data: Data, back: Any, second: dict[str, tuple[Array, Array, Array]], i: int) -> dict[str, Any]:
-    walk, mechanism, values = back.walk, run.system.mechanism, run.values
-
-    def here(number: Any) -> float:
-        return float(np.broadcast_to(number, (STEPS,))[i])
-
-    bodies = {}
-    for link in mechanism.links:
-        if link == mechanism.fixed_link:
-            continue
+def bodies_at(run: Run, data: Data, back: Any, second: dict[str, Array], i: int) -> dict[str, newton_euler.Body]:
+    walk, values, bodies = back.walk, run.values, {}
+    for link, acceleration in second.items():
         loads = []
         for load in data.get("loads", {}).values():
-            if load.get("link") != link:
-                continue
-            at = walk.point(link, load["at"]).place if "at" in load else (0.0, 0.0)
-            force = load.get("force", (0.0, 0.0))
-            loads.append(newton_euler.Load((here(at[0]), here(at[1])), force, load.get("moment", 0.0)))
-        x, y = walk.at(link, run.system.centre(values, link)).place
+            if load.get("link") == link:
+                at = walk.point(link, load["at"]).place if "at" in load else (0.0, 0.0)
+                place, force = [here(n, i) for n in at], load.get("force", (0.0, 0.0))
+                loads.append(newton_euler.Load(place, force, load.get("moment", 0.0)))
+        centre = [here(n, i) for n in walk.at(link, run.system.centre(values, link)).place]
+        mass, inertia = (values[f"links.{link}.{what}"] for what in ("mass", "inertia"))
         bodies[link] = newton_euler.Body(
-            values[f"links.{link}.mass"],
-            values[f"links.{link}.inertia"],
-            (here(x), here(y)),
-            (second[link][0][i], second[link][1][i]),
-            second[link][2][i],
-            loads,
-        )
+            mass, inertia, centre, acceleration[:2, i], acceleration[2, i], loads=loads
+        )  # fmt: skip
     return bodies
 
 
 def joints_at(run: Run, back: Any, i: int) -> dict[str, newton_euler.Joint]:
-    def here(number: Any) -> float:
-        return float(np.broadcast_to(number, (STEPS,))[i])
-
-    ground = run.system.mechanism.fixed_link
-    joints = {}
-    for name, (kind, (first, second)) in run.system.joints.items():
-        at, axis = back.walk.element(second, name), back.walk.element(first, name)
-        joints[name] = newton_euler.Joint(
-            kind,
-            None if first == ground else first,
-            None if second == ground else second,
-            (here(at.x), here(at.y)),
-            (here(axis.c), here(axis.s)),
-            here(back.friction[name]),
-            name in run.system.mechanism.drivers,
-        )
-    for name, gear in run.system.mechanism.gears.items():
-        if gear.teeth:
-            joints[name] = tooth_contact(run, back, name, i)
-    return joints
+    mechanism, joints = run.system.mechanism, {}
+    for name, (kind, links) in run.system.joints.items():
+        at, axis = back.walk.element(links[1], name), back.walk.element(links[0], name)
+        first, second = (None if link == mechanism.fixed_link else link for link in links)
+        point, slide = (here(at.x, i), here(at.y, i)), (here(axis.c, i), here(axis.s, i))
+        joint = newton_euler.Joint(kind, first, second, point, slide, driven=name in mechanism.drivers)
+        joints[name] = replace(joint, friction=here(back.friction[name], i) * newton_euler.wrenches(joint)[1])
+    teeth = {name: teeth_at(run, back, name, i) for name, gear in mechanism.gears.items() if gear.teeth}
+    return {**joints, **teeth}
 
 
-def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
-    """The teeth of a gear pair: they touch where the gears have one velocity, on the line of their centres.
+def teeth_at(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
+    """The teeth of a gear pair or rack: they touch where both have one velocity, which is along them.
 
     What pushes the gears apart is given as found, and checked against its law in `test_gears`.
     """
-
-    def here(number: Any) -> float:
-        return float(np.broadcast_to(number, (STEPS,))[i])
-
-    walk, pairs = back.walk, [set(run.system.joints[j][1]) for j in run.system.mechanism.gears[name].joints]
-    (carrier,) = pairs[0] & pairs[1]
-    one, two = (next(iter(pair - {carrier})) for pair in pairs)
-    a, d = (walk.element(carrier, joint) for joint in run.system.mechanism.gears[name].joints)
-    if run.system.mechanism.gears[name].slides:
-        return rack_contact(run, back, name, i)
-    centre, line = np.array([here(a.x), here(a.y)]), np.array([here(d.x - a.x), here(d.y - a.y)])
-    spin = [here(walk.motions[link].twist.w - walk.motions[carrier].twist.w) for link in (one, two)]
-    point = centre + line * spin[1] / (spin[1] - spin[0])
-    tangent = np.array([-line[1], line[0]]) / np.hypot(*line)
-    across = np.array([-tangent[1], tangent[0]])
-    found = across @ [here(part) for part in back.gears[name].force]
-    ground = run.system.mechanism.fixed_link
-    first, second = (None if link == ground else link for link in (one, two))
-    return newton_euler.Joint("contact", first, second, point, tangent, found)
-
-
-def rack_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
-    """The teeth of a rack: they touch where the pinion has the rack's velocity, as their carrier sees it."""
-
-    def here(number: Any) -> float:
-        return float(np.broadcast_to(number, (STEPS,))[i])
-
-    walk, pair = back.walk, run.system.mechanism.gears[name].joints
-    turning, sliding = sorted(pair, key=lambda joint: run.system.joints[joint][0] == "prismatic")
-    sides = [set(run.system.joints[joint][1]) for joint in (turning, sliding)]
-    (carrier,) = sides[0] & sides[1]
-    pinion, rack = (next(iter(side - {carrier})) for side in sides)
-    centre = walk.element(carrier, turning)
-    against = {
-        link: walk.algebra.minus(walk.motions[link].twist, walk.motions[carrier].twist) for link in (pinion, rack)
-    }
-    at, spin = np.array([here(centre.x), here(centre.y)]), here(against[pinion].w)
-    velocity = np.array([here(against[rack].x), here(against[rack].y)])  # the rack does not turn against the carrier
-    towards = np.array([velocity[1], -velocity[0]]) / spin
+    joints, twists = run.system.joints, {link: motion.twist for link, motion in back.walk.motions.items()}
+    pair = sorted(run.system.mechanism.gears[name].joints, key=lambda joint: joints[joint][0] == "prismatic")
+    (carrier,) = set(joints[pair[0]][1]) & set(joints[pair[1]][1])
+    gears = [next(link for link in joints[joint][1] if link != carrier) for joint in pair]
+    one = np.array([here(n, i) for n in back.walk.algebra.minus(twists[gears[0]], twists[carrier])])
+    x, y, w = (here(part, i) for part in back.walk.algebra.minus(twists[gears[1]], twists[gears[0]]))
+    point = np.array([-y, x]) / w
+    velocity = one[:2] + one[2] * np.array([-point[1], point[0]])
     tangent = velocity / np.hypot(*velocity)
     across = np.array([-tangent[1], tangent[0]])
-    push = across @ [here(part) for part in back.gears[name].force]  # on the rack
-    ground = run.system.mechanism.fixed_link
-    first, second = (None if link == ground else link for link in (pinion, rack))
-    return newton_euler.Joint("contact", first, second, at + towards, tangent, push)
+    apart = across * (across @ [here(part, i) for part in back.gears[name].force])
+    first, second = (None if link == run.system.mechanism.fixed_link else link for link in gears)
+    return newton_euler.Joint("contact", first, second, point, tangent, friction=[*apart, 0.0])
 
 
 NO_CONTACT = ("rocker train", "screwed strut")  # torques alone; a screw against a driven slide in `test_gears`
@@ -179,13 +116,12 @@ def test_reactions_and_efforts(name: str, friction: float | None) -> None:
         joints = joints_at(run, back, i)
         oracle = newton_euler.solve(bodies_at(run, data, back, second, i), joints, data["gravity"])
         for joint, reaction in back.reactions.items():
-            found = [float(np.broadcast_to(n, (STEPS,))[i]) for n in (reaction.x, reaction.y, reaction.m)]
+            found = [here(n, i) for n in (reaction.x, reaction.y, reaction.m)]
             np.testing.assert_allclose(found[:2], oracle.force[joint], rtol=0, atol=1e-8 * scale, err_msg=joint)
             np.testing.assert_allclose(found[2], oracle.moment[joint], rtol=0, atol=1e-8 * scale * arm, err_msg=joint)
         for driver, effort in back.efforts.items():
             size = scale * (arm if joints[driver].kind == "revolute" else 1.0)
-            found = float(np.broadcast_to(effort, (STEPS,))[i])
-            np.testing.assert_allclose(found, oracle.effort[driver], rtol=0, atol=1e-8 * size, err_msg=driver)
+            np.testing.assert_allclose(here(effort, i), oracle.effort[driver], rtol=0, atol=1e-8 * size, err_msg=driver)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -236,7 +172,7 @@ def guess(run: Any, back: Any, engine: Engine, i: int) -> Array:
         turn = np.arctan2(one.c * two.s - one.s * two.c, one.c * two.c + one.s * two.s)
         slide = one.c * (two.x - one.x) + one.s * (two.y - one.y)
         value = turn if engine.joints[name]["type"] == "revolute" else slide
-        q[dof] = engine.sense[name] * np.round(np.broadcast_to(value, (STEPS,))[i], 1)
+        q[dof] = engine.sense[name] * np.round(here(value, i), 1)
     return q
 
 
@@ -271,15 +207,14 @@ def test_agrees_with_mujoco(name: str, friction: float) -> None:
     """
     options: Data = {"friction": friction, "radius": RADIUS, "guide": GUIDE}
     run, engine = (prepare(build(MODELS[name](), **options)), Engine(model(MODELS[name](), **options), RADIUS, GUIDE))
-    time = (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
+    time = times(run)
     back = run.solve(time)
     drives = [run.system.drive(run.values, driver, time) for driver in engine.drivers]
     pairs: dict[str, list[Array]] = {}
     for i in range(STEPS):
         engine.move(guess(run, back, engine, i), [(float(q[i]), float(rate)) for q, rate, _ in drives])
         for kind, ours, theirs in compared(run, back, engine, i, friction):
-            here = [np.broadcast_to(n, (STEPS,))[i] for n in ours]
-            pairs.setdefault(kind, []).append(np.array([here, theirs], float))
+            pairs.setdefault(kind, []).append(np.array([[here(n, i) for n in ours], theirs], float))
     for kind, found in pairs.items():
         ours, theirs = np.concatenate(found, axis=1)
         rubs = friction and kind.startswith(("force", "moment", "friction", "drive"))

@@ -16,7 +16,7 @@ from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
 from reference.maximal_space import Array, Data, Drive, Frame, Motion, carried, unrolled
 from reference.mujoco_space import Engine, quaternion
-from reference.newton_euler_space import Solution
+from reference.newton_euler import Solution
 from reference.space_oracle import Oracle
 
 STEPS = 9
@@ -217,5 +217,5 @@ def test_agrees_with_mujoco(name: str) -> None:
         forces = engine.forces()
         reactions = {joint: force for joint, (force, _) in forces.reactions.items()}
         moments = {joint: moment for joint, (_, moment) in forces.reactions.items()}
-        couple = compared.forces_agree(i, Solution(reactions, moments, forces.efforts, forces.spins, 0.0), 1e-11)
+        couple = compared.forces_agree(i, Solution(reactions, moments, forces.efforts, forces.spins), 1e-11)
         assert all(abs(moment) < 1e-11 * couple for moment in forces.spins.values())

@@ -13,7 +13,7 @@ import trunnion
 from brief import brief
 from mechanisms import MODELS, build, model
 from mechanisms_space import cardan, rssr
-from reference.maximal_space import Data
+from reference.maximal_space import Data, raised
 from reference.test_space_values import loop
 from trunnion.solve.run import prepare
 from trunnion.solve.space.determinacy import LOOKED
@@ -217,43 +217,11 @@ NAMES = [
 STEPS = 16
 
 
-def raised(data: Data) -> Data:
-    """The same model in space: z across the plane, pins along z; inertia about x and y is that of a thin plate."""
-
-    def point(stated: Any, joint: dict[str, Any] | None) -> Data:
-        at = stated["at"] if isinstance(stated, dict) else stated
-        found: Data = {"at": [*at, 0.0]}
-        if joint and joint["type"] == "prismatic":
-            return {**found, "axis": [*stated["axis"], 0.0], "x": [0, 0, 1]}
-        return {**found, "axis": [0, 0, 1], "x": [1, 0, 0]} if joint else found
-
-    links: Data = {}
-    for name, link in data["links"].items():
-        points = {p: point(stated, data["joints"].get(p)) for p, stated in link["points"].items()}
-        links[name] = {**link, "points": points}
-        if "centre" in link:
-            links[name]["centre"] = [*link["centre"], 0.0]
-        if "inertia" in link:
-            links[name]["inertia"] = {"xx": link["inertia"] / 2, "yy": link["inertia"] / 2, "zz": link["inertia"]}
-    loads: Data = {}
-    for name, load in data.get("loads", {}).items():
-        loads[name] = dict(load)
-        if "force" in load:
-            loads[name]["force"] = [*load["force"], 0.0]
-        if "moment" in load:
-            loads[name]["moment"] = [0.0, 0.0, load["moment"]]
-    defaults = data["joint_defaults"]
-    hints = {name: [*hint, 0.0] if isinstance(hint, list) else hint for name, hint in data.get("assembly", {}).items()}
-    return {
-        **data,
-        "space": "spatial",
-        "over_constraint": "minimum-norm",
-        "gravity": [*data["gravity"], 0.0],
-        "links": links,
-        "loads": loads,
-        "assembly": hints,
-        "joint_defaults": {**defaults, "pin": {**defaults["pin"], "bearing": 0.05}},
-    }
+def in_space(data: Data) -> Data:
+    """The same model in space, its pins with a length."""
+    data, defaults = raised(data), data["joint_defaults"]
+    pin = {**defaults["pin"], "bearing": 0.05}
+    return {**data, "over_constraint": "minimum-norm", "joint_defaults": {**defaults, "pin": pin}}
 
 
 @pytest.mark.slow
@@ -263,7 +231,7 @@ def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
     """Motion to 1e-10, forces to 1e-8 of the largest; nothing across the plane, where friction is refused for that."""
     data = model(MODELS[name](), friction=friction)
     flat = brief(build(MODELS[name](), friction=friction), STEPS)
-    space = brief(trunnion.Mechanism(trunnion=1, **raised(data)), STEPS, refuse=False)
+    space = brief(trunnion.Mechanism(trunnion=1, **in_space(data)), STEPS, refuse=False)
     np.testing.assert_array_equal(flat.status.values, space.status.values)
     points = [p for p in flat.point.values if p in space.point.values]
     for what, limit in (("position", 1e-10), ("velocity", 1e-9), ("acceleration", 1e-8)):

@@ -325,6 +325,34 @@ def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.
     return data
 
 
+LENGTHS = ("points", "at", "centre", "assembly", "radius", "length", "width", "bearing", "offset", "clearance", "pitch",
+           "lead")  # fmt: skip
+
+
+def in_units(data: Data, length: float, mass: float = 1.0, time: float = 1.0) -> Data:
+    """The same mechanism told in other units: a metre is `length`, a kilogram `mass`, a second `time` of them."""
+    force = mass * length / time**2
+    units = dict.fromkeys(LENGTHS, length) | dict.fromkeys(("axis", "x"), 1.0)
+    units |= {"mass": mass, "inertia": mass * length**2, "gravity": length / time**2, "force": force}
+    units |= dict.fromkeys(("moment", "resisting_torque"), force * length)
+
+    def told(value: Any, unit: float) -> Any:
+        if isinstance(value, dict):
+            return {key: told(part, units.get(key, unit)) for key, part in value.items()}
+        if isinstance(value, list):
+            return [told(part, unit) for part in value]
+        return value if unit == 1.0 or isinstance(value, str | bool) else unit * value
+
+    data = told(copy.deepcopy(data), 1.0)
+    for name, driver in data["drivers"].items():
+        unit = length if data["joints"][name]["type"] == "prismatic" else 1.0
+        driver |= {"speed": driver["speed"] * unit / time} if "speed" in driver else {}
+        driver |= {"range": told(driver["range"], unit)} if "range" in driver else {}
+    for gear in data.get("gears", {}).values():
+        gear |= {"phase": length * gear["phase"]} if "phase" in gear and "ratio" not in gear else {}
+    return dict(data)
+
+
 def _turn_gears(data: Data, turn: float, sign: float) -> None:
     """Rotations against the ground count from the frame's x axis, which has turned."""
     for gear in data.get("gears", {}).values():

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
-from mechanisms import DURANGO, model, slider_crank, transformed
+from mechanisms import DURANGO, in_units, model, slider_crank, transformed
+from mechanisms_parts import joined
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.results.scales import Scales, without_noise
@@ -21,36 +22,20 @@ Data = dict[str, Any]
 SIZES = [(1.0, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]
 
 
-def sized(data: Any, length: float, force: float, key: str = "") -> Any:
+def sized(data: Data, length: float, force: float) -> Data:
     """A model with all its lengths and forces so many times as large, at the same angular speeds."""
-    powers = {
-        **dict.fromkeys(("at", "centre", "radius", "length", "bearing", "clearance", "gravity", "points"), length),
-        **dict.fromkeys(("moment", "resisting_torque", "inertia"), force * length),
-        "force": force,
-        "mass": force / length,
-    }
-    factor = powers.get(key, 1.0)
-    if isinstance(data, dict):
-        inner = key if key in ("points", "inertia", "assembly") else ""
-        return {name: sized(value, length, force, name if name in powers or not inner else inner)
-                for name, value in data.items()}  # fmt: skip
-    if isinstance(data, list) and data and not isinstance(data[0], str):
-        return [length * one if key == "assembly" else factor * one for one in data]
-    return factor * data if isinstance(data, float | int) and factor != 1.0 else data
+    return in_units(data, length, force / length)
 
 
 def balanced(space: str = "planar") -> Data:
     """A massless mechanism whose loads cancel but for rounding, rocked back and forth by its driver."""
-    moments = {"a": 0.3, "b": -0.1, "c": -0.2}
+    moments: dict[str, Any] = {"a": 0.3, "b": -0.1, "c": -0.2}
     if space == "spatial":
-        data = rssr(friction=0.1).data
-        loads = {
-            name: {"link": "rocker", "moment": [0.0, 0.0, one]}
-            for name, one in zip("abc", (0.3, -0.1, -0.2), strict=True)
-        }
+        data, link = rssr(friction=0.1).data, "rocker"
+        moments = {name: [0.0, 0.0, moment] for name, moment in moments.items()}
     else:
-        data = transformed(model(slider_crank(offset=0.0), friction=0.1), 0.3)
-        loads = {name: {"link": "rod", "moment": one} for name, one in moments.items()}
+        data, link = transformed(model(slider_crank(offset=0.0), friction=0.1), 0.3), "rod"
+    loads = {name: {"link": link, "moment": moment} for name, moment in moments.items()}
     data["drivers"] = {"A": {"law": "harmonic", "mean": 1.0, "amplitude": 0.4, "period": 1.0}}
     for link in data["links"].values():
         for key in ("mass", "centre", "inertia"):
@@ -68,11 +53,7 @@ def parallel() -> Data:
             "coupler": {"points": {"B": [0, 0], "C": [0.1, 0.07]}, "mass": 1.0},
             "rocker": {"points": {"D": [0, 0], "C": [0.03, 0]}},
         },
-        "joints": {
-            name: {"type": "revolute", "links": list(links)}
-            for name, links in {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"),
-                                "D": ("ground", "rocker")}.items()
-        },
+        "joints": joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker"),
         "joint_defaults": {"pin": {"radius": 0.005}, "friction": 0.1},
         "drivers": {"A": {"speed": 2.0, "range": [1.0, 3.0]}},
         "assembly": {"C": [0.1162, 0.0952]},
@@ -116,8 +97,7 @@ def test_what_is_constant_has_no_place(length: float, force: float) -> None:
         "gravity": [0, 0],
         "links": {"ground": {"points": {"A": [0, 0], "B": [0.06, 0]}}, "one": {"points": {"A": [0, 0]}},
                   "two": {"points": {"B": [0, 0]}}},
-        "joints": {"A": {"type": "revolute", "links": ["ground", "one"]},
-                   "B": {"type": "revolute", "links": ["ground", "two"]}},
+        "joints": joined("ground -A- one, ground -B- two"),
         "gears": {"G": {"joints": ["A", "B"], "ratio": -1.0}},
         "joint_defaults": {"pin": {"radius": 0.02}, "friction": 0.5},
         "drivers": {"A": {"speed": 1.0}},
@@ -162,9 +142,7 @@ def test_joints_in_one_point_have_loads_and_losses() -> None:
             "output": {"points": {"C": {"at": middle, "axis": axis, "x": [0, 0, 1]},
                                   "K": {"at": middle, "axis": [0, 0, 1]}}},
         },
-        "joints": {"A": {"type": "revolute", "links": ["ground", "input"]},
-                   "C": {"type": "cylindrical", "links": ["ground", "output"]},
-                   "K": {"type": "universal", "links": ["input", "output"]}},
+        "joints": joined("ground -A- input, ground -C:cylindrical- output, input -K:universal- output"),
         "joint_defaults": {"pin": {"radius": 0.006, "bearing": 0.04}, "friction": 0.15},
         "drivers": {"A": {"speed": 10.0}}, "loads": {"brake": {"joint": "C", "resisting_torque": 10, "useful": True}},
         "assembly": {"C": 0},

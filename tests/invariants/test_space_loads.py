@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import trunnion
 from brief import brief
+from mechanisms_parts import joined
 from mechanisms_space import floating
 from timed import LINEAR, slider_crank, wheel
 from trunnion import Mechanism, MechanismError, read, simulate, sweep
@@ -71,31 +72,6 @@ def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
 
 
-def test_a_loop_is_the_same_as_its_links() -> None:
-    """The table of an RCCC written out as links with points: the element of a joint behind X(twist + ε distance)."""
-    loop = massless(loads={"load": {"joint": "D", "resisting_torque": 1.0}})
-    values = loop.parameters()
-    links: dict[str, Any] = {row.link: {"points": {}} for row in loop.loop}
-    for k, row in enumerate(loop.loop):
-        twist, distance = (values[f"loop.{row.joint}.{key}"] for key in ("twist", "distance"))
-        slide = values.get(f"loop.{row.joint}.slide", 0.0)
-        following = loop.loop[(k + 1) % 4].joint
-        links[row.link]["points"][row.joint] = {"at": [0, 0, -slide], "axis": [0, 0, 1], "x": [1, 0, 0]}
-        axis = [0.0, -np.sin(twist), np.cos(twist)]
-        links[row.link]["points"][following] = {"at": [distance, 0, 0], "axis": axis, "x": [1, 0, 0]}
-    joints = {name: {"type": one.type, "links": list(one.links)} for name, one in loop.effective_joints.items()}
-    data = {key: value for key, value in loop.data().items() if key != "loop"}
-    written = Mechanism(**data, links=links, joints=joints)
-    one, two = brief(loop, STEPS), brief(written, STEPS)
-    for quantity in ("drive_effort", "joint_rotation", "joint_slide_velocity", "reaction_force"):
-        expected = one[quantity]
-        if quantity == "reaction_force":  # the frame of the ground is another
-            expected, found = (np.linalg.norm(each[quantity].values, axis=1) for each in (one, two))
-            np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
-        else:
-            np.testing.assert_allclose(two[quantity].values, expected.values, atol=1e-11)
-
-
 LOSSES: dict[str, dict[str, Any]] = {
     "S": {"constant": 20, "viscous": 3},
     "Q": {"constant": "20 N mm", "viscous": "1e-3 N m s/rad"},
@@ -122,34 +98,29 @@ def loaded(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism
     return Mechanism(**{**data, "loads": loads, "springs": springs})
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_they_resist_as_loads_and_dampers_do(friction: float) -> None:
+@pytest.mark.parametrize(
+    ("base", "losses"),
+    [
+        (slider_crank(0.0), LOSSES),
+        (slider_crank(0.1), LOSSES),
+        (read(EXAMPLES / "rssr.yaml"), {"D": {"constant": 2, "viscous": 0.3}}),
+    ],
+    ids=["without friction", "with friction", "in space"],
+)
+def test_they_resist_as_loads_and_dampers_do(base: Mechanism, losses: dict[str, dict[str, Any]]) -> None:
     """All forces are equal, the intervals at rest too; their power is lost in the joint and is no load's."""
-    base = slider_crank(friction)
-    one, other = brief(lossy(base, LOSSES), 72), brief(loaded(base, LOSSES), 72)
+    one, other = brief(lossy(base, losses), 72), brief(loaded(base, losses), 72)
     same = ("drive_effort", "reaction_force", "drive_effort_lower", "drive_effort_upper", "useful_power", "status")
     for name in same:
         largest = float(np.abs(other[name]).max())
         assert one[name].values == pytest.approx(other[name].values, abs=1e-12 * largest), name
-    lost = one["friction_power"] - other["friction_power"]
-    speed = one["joint_slide_velocity"].sel(joint="S").values
-    assert lost.sel(joint="S").values == pytest.approx(20 * np.abs(speed) + 3 * speed**2, abs=1e-9)
-    force = one["friction_force"] - other["friction_force"]
-    wanted = -20 * np.sign(speed) * (np.abs(speed) > 1e-9) - 3 * speed
-    assert force.sel(joint="S").values == pytest.approx(wanted, abs=1e-9)
-    assert np.abs(one["power_residual"].values).max() < 1e-10 * float(np.abs(one["drive_power"]).max())
-
-
-def test_they_resist_in_space() -> None:
-    base = read(EXAMPLES / "rssr.yaml")
-    joint = next(name for name, one in base.joints.items() if one.type == "revolute" and name not in base.drivers)
-    losses = {joint: {"constant": 2, "viscous": 0.3}}
-    one, other = brief(lossy(base, losses), 36), brief(loaded(base, losses), 36)
-    largest = float(np.abs(other["drive_effort"]).max())
-    assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, abs=1e-12 * largest)
-    lost = (one["friction_power"] - other["friction_power"]).sel(joint=joint).values
-    speed = one["joint_rotation_velocity"].sel(joint=joint).values
-    assert lost == pytest.approx(2 * np.abs(speed) + 0.3 * speed**2, abs=1e-9)
+    name = next(iter(losses))
+    motion, effort = ("slide", "force") if name == "S" else ("rotation", "torque")
+    speed = joint(one, f"joint_{motion}_velocity", name)
+    constant, viscous = (losses[name][key] for key in ("constant", "viscous"))
+    lost, pull = (joint(one - other, quantity, name) for quantity in ("friction_power", f"friction_{effort}"))
+    assert lost == pytest.approx(constant * np.abs(speed) + viscous * speed**2, abs=1e-9)
+    assert pull == pytest.approx(-constant * np.sign(speed) * (np.abs(speed) > 1e-9) - viscous * speed, abs=1e-9)
     assert np.abs(one["power_residual"].values).max() < 1e-10 * float(np.abs(one["drive_power"]).max())
 
 
@@ -199,6 +170,7 @@ def jack(**load: Any) -> Mechanism:
     """A driven screw of 6 mm pitch and 10 mm mean radius lifts a floating nut."""
     line, across = {"at": [0, 0, 0], "axis": [0, 0, 1]}, {"at": [0, 0, 0], "axis": [0, 1, 0]}
     links, joints = floating("nut")
+    thread = {"pitch": "6 mm", "friction": 0, "pin": {"radius": "10 mm", "bearing": "50 mm"}}
     return Mechanism(
         space="spatial",
         gravity=[0, 0, 0],
@@ -208,12 +180,7 @@ def jack(**load: Any) -> Mechanism:
             "nut": {"points": {"H": line, "U": across}},
             **links,
         },
-        joints={
-            **joints,
-            "A": {"type": "revolute", "links": ["ground", "screw"]},
-            "H": {"type": "helical", "links": ["screw", "nut"], "pitch": "6 mm", "friction": 0,
-                  "pin": {"radius": "10 mm", "bearing": "50 mm"}},
-        },
+        joints=joints | joined("ground -A- screw -H:helical- nut", H=thread),
         drivers={"A": {"speed": 2.0}},
         loads={"load": load},
     )  # fmt: skip

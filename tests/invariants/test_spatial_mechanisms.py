@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brief import brief
+from mechanisms import in_units
 from mechanisms_parts import joined
 from mechanisms_space import chain, rssr
 from trunnion import Mechanism, MechanismError, Status, analyse
@@ -29,16 +30,6 @@ def drawn(symbols: str) -> Data:
         if joint["type"] != "planar":
             joint["friction"] = 0.02
     return data
-
-
-def moved(point: Any, axes: Array, shift: Array, scale: float = 1.0) -> Data:
-    """A point of a link in another frame, with the directions that its element has."""
-    stated = dict(point) if isinstance(point, dict) else {"at": point}
-    axis = np.array(stated.get("axis", [0.0, 0.0, 1.0]), float)
-    along_x = abs(axis[0]) > 0.999 * np.linalg.norm(axis)
-    x = np.array(stated.get("x", [0.0, 1.0, 0.0] if along_x else [1.0, 0.0, 0.0]), float)
-    at = scale * axes @ np.array(stated["at"], float) + shift
-    return {"at": at.tolist(), "axis": (axes @ axis).tolist(), "x": (axes @ x).tolist()}
 
 
 @functools.cache
@@ -59,22 +50,7 @@ def same(one: Any, two: Any, names: Sequence[str]) -> None:
 @pytest.mark.parametrize("symbols", ["RSCR", "RCCC", "HCCC"])
 def test_micrometres_and_kilometres(symbols: str, length: float) -> None:
     """All lengths times a factor at the same masses and times: forces times it, moments times its square."""
-    data = drawn(symbols)
-    other = copy.deepcopy(data)
-    for link in other["links"].values():
-        link["points"] = {name: moved(point, np.eye(3), np.zeros(3), length) for name, point in link["points"].items()}
-        if "mass" in link:
-            link["centre"] = [length * n for n in link["centre"]]
-            link["inertia"] = {key: length**2 * n for key, n in link["inertia"].items()}
-    other["gravity"] = [length * n for n in other["gravity"]]
-    for load in other["loads"].values():
-        load |= {key: [length**k * n for n in load[key]] for key, k in (("force", 1), ("moment", 2)) if key in load}
-    for joint in other["joints"].values():
-        for key in ("pin", "guide"):
-            joint |= {key: {name: length * n for name, n in joint[key].items()}} if key in joint else {}
-        joint |= {"pitch": length * joint["pitch"]} if "pitch" in joint else {}
-    other["assembly"] = {name: [length * n for n in place] for name, place in other["assembly"].items()}
-    one, two = unchanged(symbols), brief(Mechanism(**other), STEPS)
+    one, two = unchanged(symbols), brief(Mechanism(**in_units(drawn(symbols), length)), STEPS)
     for name, power in (("drive_effort", 2), ("reaction_force", 1), ("reaction_moment", 2), ("friction_power", 2)):
         two[name] = two[name] / length**power
     same(one, two, ("status", "drive_effort", "reaction_force", "reaction_moment", "friction_power", "condition"))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from benchmarks.studio import chain
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
@@ -13,7 +14,9 @@ from scipy.sparse.csgraph import connected_components, maximum_bipartite_matchin
 
 import trunnion
 from mechanisms import MODELS, Data, build, four_bar, model, revolute
+from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError
+from trunnion.model.file import entries_of
 from trunnion.structure.decompose import Plan, decompose, mobility_by_rank
 from trunnion.structure.graph import components, longest_loop, matching
 
@@ -125,8 +128,6 @@ def test_the_driver_decides_the_modules(name: str) -> None:
 
 def parallelogram(third: float) -> Data:
     """With a third crank, beside the two or off their line."""
-    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
-    ends |= {"G": ["ground", "third"], "H": ["third", "coupler"]}
     return {
         "links": {
             "ground": {"points": {"A": [0, 0], "D": [2, 0], "G": [1, third]}},
@@ -135,7 +136,7 @@ def parallelogram(third: float) -> Data:
             "rocker": {"points": {"D": [0, 0], "C": [0.5, 0]}},
             "third": {"points": {"G": [0, 0], "H": [0.5, 0]}},
         },
-        "joints": {name: revolute(*links) for name, links in ends.items()},
+        "joints": joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker, ground -G- third -H- coupler"),
         "drivers": {"A": {"speed": 1.0, "start": 0.5}},
         "assembly": {"C": [2.4, 0.2]},
     }
@@ -196,30 +197,12 @@ def test_check(name: str) -> None:
     """Both mobilities agree on ordinary linkages, and nothing is wrong with them."""
     found = trunnion.check(build(MODELS[name]()), 36)
     assert found.mobility == found.rank_mobility == len(MODELS[name]()["drivers"])
-    assert found.formula == FORMULAS[name]
     assert not [f for f in found.findings if f.severity == "error"]
     assert len(found.assemblies) == len(found.plan.modules)
 
 
-def ladder(count: int) -> Data:
-    """A crank and rocker after rocker behind it, each on its own dyad: two links more in each four-bar of the row."""
-    data: Data = {"links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P0": [0.03, 0]}}}}
-    data["joints"] = {"A": revolute("ground", "crank")}
-    before = "crank"
-    for k in range(1, count + 1):
-        coupler, rocker = f"coupler-{k}", f"rocker-{k}"
-        data["links"]["ground"]["points"][f"O{k}"] = [0.1 * k, 0]
-        data["links"][coupler] = {"points": {f"P{k - 1}": [0, 0], f"C{k}": [0.1, 0]}}
-        data["links"][rocker] = {"points": {f"O{k}": [0, 0], f"C{k}": [0.07, 0], f"P{k}": [0.07, 0]}}
-        data["joints"] |= {f"P{k - 1}": revolute(before, coupler), f"C{k}": revolute(coupler, rocker)}
-        data["joints"][f"O{k}"] = revolute("ground", rocker)
-        before = rocker
-    del data["links"][before]["points"][f"P{count}"]
-    return data | {"drivers": {"A": {"speed": 1.0}}}
-
-
 def test_mobility_by_rank_of_a_long_row() -> None:
-    found = trunnion.check(Mechanism(**ladder(120)), 8)
+    found = trunnion.check(Mechanism(**entries_of(chain(120))[0]), 8)
     assert found.mobility == found.rank_mobility == 1
 
 

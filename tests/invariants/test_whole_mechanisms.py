@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 from brief import brief
-from mechanisms import MODELS, Data, build, law_named, model, transformed
+from mechanisms import MODELS, Data, build, in_units, law_named, model, transformed
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.solve.run import prepare
@@ -75,43 +74,6 @@ def test_velocities_and_accelerations_are_derivatives(name: str) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=2e-8 * max(1.0, np.abs(expected).max()))
 
 
-def _times(v: Any, unit: float) -> list[float]:
-    return [unit * float(n) for n in v]
-
-
-def scaled(data: Data, length: float, mass: float, time: float) -> Data:
-    """The same mechanism told in other units: a metre is `length`, a kilogram `mass`, a second `time` of them."""
-    data = copy.deepcopy(data)
-    force, moment = mass * length / time**2, mass * length**2 / time**2
-
-    for link in data["links"].values():
-        for key, at in link["points"].items():
-            link["points"][key] = {**at, "at": _times(at["at"], length)} if isinstance(at, dict) else _times(at, length)
-        if "mass" in link:
-            link["mass"] *= mass
-            link["inertia"] *= mass * length**2
-            link["centre"] = _times(link["centre"], length)
-    data["gravity"] = _times(data["gravity"], length / time**2)
-    for load in data["loads"].values():
-        if "force" in load:
-            load["force"] = _times(load["force"], force)
-        if "moment" in load:
-            load["moment"] *= moment
-    for name, driver in data["drivers"].items():
-        unit = length if data["joints"][name]["type"] == "prismatic" else 1.0
-        driver["speed"] *= unit / time
-        if "range" in driver:
-            driver["range"] = _times(driver["range"], unit)
-    data["assembly"] = {key: _times(value, length) for key, value in data.get("assembly", {}).items()}
-    for gear in data.get("gears", {}).values():
-        for key in {"radius", "lead", "phase"} & gear.keys() if "ratio" not in gear else ():
-            gear[key] *= length
-    data["joint_defaults"]["pin"]["radius"] *= length
-    if "guide" in data["joint_defaults"]:
-        data["joint_defaults"]["guide"]["length"] *= length
-    return data
-
-
 def as_seen(data: Data, kind: str) -> tuple[Data, dict[str, Any]]:
     """The same machine told otherwise, and by what its numbers are multiplied: vectors by a matrix."""
     units: dict[str, Any] = dict.fromkeys((*EVEN, *ODD, "reaction_moment"), 1.0)
@@ -129,7 +91,7 @@ def as_seen(data: Data, kind: str) -> tuple[Data, dict[str, Any]]:
     units |= dict.fromkeys(("drive_power", "friction_power", "useful_power"), power) | {"joint_slide": length}
     units |= {"joint_slide_velocity": length * rate, "friction_torque": force * length, "friction_force": force}
     units |= {"link_angle_velocity": rate, "link_angle_acceleration": rate**2, "joint_rotation_velocity": rate}
-    return scaled(data, length, mass, time), units | {"reaction_moment": force * length, "link_angle": 1.0}
+    return in_units(data, length, mass, time), units | {"reaction_moment": force * length, "link_angle": 1.0}
 
 
 @pytest.mark.spread(6)

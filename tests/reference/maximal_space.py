@@ -137,7 +137,8 @@ def in_planes(data: Data) -> Data:
     upright = point(REST.frame)
     links = {name: {**link, "points": dict(link["points"])} for name, link in data["links"].items()}
     for name in [name for name in links if name != "ground"]:
-        joints[f"plane of {name}"] = {"type": "planar", "links": ["ground", name], "friction": 0.0}
+        ideal = {"friction": 0.0, "pin": {"clearance": 0.0}}
+        joints[f"plane of {name}"] = {"type": "planar", "links": ["ground", name], **ideal}
         for link in ("ground", name):
             links[link]["points"][f"plane of {name}"] = upright
     return {**data, "links": links, "joints": joints}
@@ -225,7 +226,8 @@ class Linkage:
     def placed_by(self, guess: Mapping[str, Frame], drive: Mapping[str, Drive]) -> dict[str, Frame]:
         """Position alone, by Newton from a guess of the links' frames."""
         count, frames = 6 * len(self.moving), dict(guess)
-        for last in range(30):
+        size = np.inf
+        for _ in range(30):
             still = {link: Motion(frames[link], *np.zeros((4, 3))) for link in self.moving}
             value, _, _ = self.equations(still, drive, {})
             jacobian = self.jacobian(frames)
@@ -233,7 +235,8 @@ class Linkage:
                 raise ValueError(f"{jacobian.shape[0]} equations for {count} coordinates: not determinate")
             step = np.linalg.solve(jacobian, -value)
             frames = {link: stepped(frames[link], step[6 * k : 6 * k + 6]) for k, link in enumerate(self.moving)}
-            if np.max(np.abs(step)) < 1e-14 or (last > 8 and np.max(np.abs(step)) < 1e-12):
+            size, before = float(np.max(np.abs(step))), size
+            if size < 1e-14 or 0.1 * before < size < 1e-12:  # rounding, which no step makes smaller
                 return frames
         raise AssertionError("not assembled")
 

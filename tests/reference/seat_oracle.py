@@ -1,13 +1,8 @@
-"""Planar linkages whose pins lie where their loads press them, without Trunnion: an oracle for the loaded seat.
+"""Linkages whose pins, balls and guides lie where their loads press them, without Trunnion.
 
-The massless-link model of play, written out for two linkages in complex numbers. A pin in the wall of its hole at the
-offset c is a link of the length ρ without mass: the second link's point is moved by c and everything else is as if
-ideal. Motion from the two sides of the triangle, with the offsets held; forces from the Newton–Euler equations of all
-links at once (`newton_euler`); friction, then the seats, by substitution until nothing changes any more.
-
-Signs as in the documentation: a hole is on the second link of its joint, Q the force of the pin on the hole in the axes
-of the hole's link (of a guide: along its slide and across), and c = ρ n with n = Q/|Q| turned by atan μ about z times
-the sign of the rate of the second link against the first.
+Motion in maximal coordinates (`maximal_space`), forces from the Newton–Euler equations of all links (`space_oracle`),
+elements moved by the seats in the model data (`moved`), seats and reactions in turn until nothing changes. A planar
+linkage is one whose links planar pairs hold (`in_planes`): a pin has one end, a guide two that move across alone.
 """
 
 from __future__ import annotations
@@ -17,289 +12,169 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from reference import newton_euler
+from reference.maximal_space import SLIDING, Array, Data, Drive, Frame, Motion, element, point, rotation
 from reference.newton_euler import Solution
+from reference.space_oracle import Oracle, merged
 
-Data = dict[str, Any]
-Offsets = dict[str, tuple[complex, ...]]  # of a pin one vector x + i y; of a guide both ends, across alone, real
+__all__ = ["Settled", "clearance", "moved", "settle", "travelling"]
 
-__all__ = ["FourBar", "Link", "Linkage", "Settled", "SliderCrank"]
-
-LIMIT = 1e-13
+ENDS = {"spherical": [[0, 1, 2]], "pin": [[0, 1]], "slot": [[1], [1]]}  # axes along which each end may move
 
 
-@dataclass(frozen=True)
-class Link:
-    """Motion of a link: origin, its velocity and acceleration, angle, rate and its derivative."""
+def axes_of(data: Data, name: str) -> list[list[int]]:
+    return ENDS.get(data["joints"][name]["type"], [[0, 1], [0, 1]])
 
-    place: complex
-    velocity: complex
-    acceleration: complex
-    angle: float
-    rate: float
-    second: float
 
-    def point(self, local: complex) -> complex:
-        return self.place + np.exp(1j * self.angle) * local
+def size_of(data: Data, name: str) -> dict[str, Any]:
+    """Sizes of the pin, or of the guide."""
+    joint = merged(data, name)
+    return dict(joint["guide" if joint["type"] in SLIDING else "pin"])
 
-    def accelerated(self, local: complex) -> complex:
-        r = np.exp(1j * self.angle) * local
-        return self.acceleration + (1j * self.second - self.rate**2) * r
+
+def clearance(data: Data, name: str) -> float:
+    return float(size_of(data, name).get("clearance", 0.0))
+
+
+def length_of(data: Data, name: str) -> float:
+    size = size_of(data, name)
+    return float(size.get("length", size.get("bearing", np.nan)))
+
+
+def moved(data: Data, seats: dict[str, float]) -> Data:
+    """The model in space with second elements moved as the offsets say."""
+    links = {name: {**link, "points": dict(link["points"])} for name, link in data["links"].items()}
+    for name, joint in data["joints"].items():
+        own = {key.removeprefix(f"seats.{name}."): n for key, n in seats.items() if key.startswith(f"seats.{name}.")}
+        if not own:
+            continue
+        link = joint["links"][1]
+        one, two = (np.array([own.get(f"{end}.{axis}", 0.0) for axis in "xyz"]) for end in (1, 2))
+        if joint["type"] in ("spherical", "pin"):
+            shift = Frame(one, np.eye(3))
+        else:
+            lean = (two - one)[:2] / length_of(data, name)
+            axis, size = np.array([-lean[1], lean[0], 0]), float(np.hypot(*lean))
+            place = np.array([*(one + two)[:2] / 2, own.get("3.z", 0.0)])
+            shift = Frame(place, rotation(axis, float(np.arctan(size))) if size else np.eye(3))
+            middle = Frame(np.array([0, 0, size_of(data, name).get("offset", 0.0)]), np.eye(3))
+            shift = middle @ shift @ middle.inverse()
+        links[link]["points"][name] = point(element(links[link], name) @ shift)
+    return {**data, "links": links}
 
 
 @dataclass(frozen=True)
 class Settled:
-    """A position with its pins in their seats: offsets, loads on the ends of the holes, motion, forces, rounds."""
+    """A position with its pins in their seats: offsets and loads by joint, (end, axis); motion, forces, rounds."""
 
-    offsets: Offsets
-    loads: dict[str, tuple[complex, ...]]
-    links: dict[str, Link]
+    oracle: Oracle
+    offsets: dict[str, Array]
+    loads: dict[str, Array]
+    motions: Mapping[str, Motion]
     solution: Solution
-    friction: dict[str, float]
+    friction: dict[str, Array]
     rounds: int
 
 
-def local(link: Data, name: str) -> complex:
-    point = link["points"][name]
-    return complex(*(point["at"] if isinstance(point, dict) else point))
+def settle(data: Data, home: Mapping[str, Frame], drive: Mapping[str, Drive], limit: float = 1e-11) -> Settled:
+    """Seats of all joints with play by substitution; AssertionError if they do not settle.
+
+    home: frames of the links near the position.
+    """
+    offsets = {name: np.zeros((len(axes_of(data, name)), 3)) for name in data["joints"] if clearance(data, name) > 0}
+    for rounds in range(200):
+        values = {f"seats.{name}.{end + 1}.{axis}": float(vector[k]) for name, ends in offsets.items()
+                  for end, vector in enumerate(ends) for k, axis in enumerate("xyz")}  # fmt: skip
+        oracle = Oracle(moved(data, values))
+        motions = oracle.move(home, drive)
+        found, friction = oracle.rub(motions)
+        loads = {name: _loads(data, motions, oracle, found, name) for name in offsets}
+        seats = {name: _seat(data, motions, loads[name], oracle, name) for name in offsets}
+        change = max(np.max(np.abs(seats[name] - offsets[name])) / clearance(data, name) for name in offsets)
+        if change <= limit:
+            return Settled(oracle, offsets, loads, motions, found, friction, rounds)
+        offsets = seats
+    raise AssertionError(f"the seats do not settle: {change:.2g} of the clearance")
 
 
-def slide_of(link: Data, name: str) -> complex:
-    axis = complex(*link["points"][name]["axis"])
-    return axis / abs(axis)
+def travelling(data: Data, home: Mapping[str, Frame], driver: str, angle: float, speed: float) -> Settled:
+    """A position with the whole motion of its links: differences of fourth order of their settled places."""
+    step = 2e-3  # rad of the driver
+    five = [settle(data, home, {driver: Drive(angle + k * step, speed)}, 1e-12) for k in (-2, -1, 0, 1, 2)]
+    first = np.array([1, -8, 0, 8, -1]) * speed / (12 * step)
+    rates = np.array([first, np.array([-1, 16, -30, 16, -1]) * speed**2 / (12 * step**2)])
+    motions = {}
+    for link in five[2].motions:
+        frames = [settled.motions[link].frame for settled in five]
+        turns = [Rotation.from_matrix(frame.axes @ frames[2].axes.T).as_rotvec() for frame in frames]
+        (velocity, second), (spin, spin_rate) = (rates @ np.array(n) for n in ([f.place for f in frames], turns))
+        motions[link] = Motion(frames[2], velocity, spin, second, spin_rate)
+    found, friction = five[2].oracle.rub(motions)
+    return replace(five[2], motions=motions, solution=found, friction=friction)
 
 
-class Linkage:
-    """What both have in common; data as the model file has it, in SI numbers, one coefficient of friction."""
-
-    def __init__(self, data: Data) -> None:
-        self.data, self.links, self.joints = data, data["links"], data["joints"]
-        defaults = data.get("joint_defaults", {})
-        self.friction = float(defaults.get("friction", 0.0))
-        self.parts = {
-            name: {key: {**defaults.get(key, {}), **joint.get(key, {})} for key in ("pin", "guide")}
-            for name, joint in self.joints.items()
-        }
-        (self.driven,) = data["drivers"]
-        self.speed = float(data["drivers"][self.driven]["speed"])
-        self.gravity = np.asarray(data.get("gravity", (0.0, 0.0)), float)
-
-    def clearance(self, joint: str) -> float:
-        part = self.parts[joint]["pin" if self.joints[joint]["type"] == "revolute" else "guide"]
-        return float(part.get("clearance", 0.0))
-
-    def at(self, link: str, joint: str, offsets: Offsets) -> complex:
-        """Place of a pin on a link, where the pin's axis is: in the second link the middle of the hole and c."""
-        moved = joint in offsets and self.joints[joint]["links"][1] == link
-        return local(self.links[link], joint) + (offsets[joint][0] if moved else 0)
-
-    def move(self, theta: float, offsets: Offsets) -> dict[str, Link]:
-        raise NotImplementedError
-
-    def bodies(self, links: Mapping[str, Link]) -> dict[str, newton_euler.Body]:
-        found = {}
-        for name, link in links.items():
-            data = self.links[name]
-            centre = complex(*data["centre"])
-            loads = []
-            for load in self.data.get("loads", {}).values():
-                if load["link"] == name:
-                    place = link.point(local(data, load["at"])) if "at" in load else 0j
-                    force = load.get("force", (0.0, 0.0))
-                    loads.append(newton_euler.Load(_pair(place), force, load.get("moment", 0.0)))
-            found[name] = newton_euler.Body(
-                data["mass"], data["inertia"], _pair(link.point(centre)), _pair(link.accelerated(centre)),
-                link.second, loads,
-            )  # fmt: skip
-        return found
-
-    def joints_at(
-        self, links: Mapping[str, Link], offsets: Offsets, friction: Mapping[str, float]
-    ) -> dict[str, newton_euler.Joint]:
-        found = {}
-        for name, joint in self.joints.items():
-            first, second = (None if link == "ground" else link for link in joint["links"])
-            axis = slide_of(self.links["ground"], name) if joint["type"] == "prismatic" else 1 + 0j
-            assert second is not None
-            if joint["type"] == "prismatic":  # the ground has the guide; the moment counts about the hole's middle
-                place = links[second].point(local(self.links[second], name))
-            else:
-                place = links[second].point(self.at(second, name, offsets))
-            found[name] = newton_euler.Joint(
-                joint["type"], first, second, _pair(place), _pair(axis), friction.get(name, 0.0), name == self.driven
-            )
-        return found
-
-    def rate(self, links: Mapping[str, Link], name: str) -> float:
-        """Rate of the second link against the first: of a guide along its slide."""
-        first, second = self.joints[name]["links"]
-        if self.joints[name]["type"] == "prismatic":
-            axis = slide_of(self.links["ground"], name)
-            return float(np.real(links[second].velocity * np.conj(axis)))
-        return links[second].rate - (links[first].rate if first != "ground" else 0.0)
-
-    def balance(self, links: Mapping[str, Link], offsets: Offsets) -> tuple[Solution, dict[str, float]]:
-        """Reactions with friction: torque f r |F| of a pin, force f (|F/2 + M/L| + |F/2 − M/L|) of a guide."""
-        bodies, friction = self.bodies(links), dict.fromkeys(self.joints, 0.0)
-        for _ in range(300):
-            found = newton_euler.solve(bodies, self.joints_at(links, offsets, friction), self.gravity)
-            wanted = {name: self.rubbed(links, found, name) for name in self.joints}
-            change = max(abs(wanted[name] - friction[name]) for name in friction)
-            friction = wanted
-            if change <= LIMIT * max(1e-300, *(abs(n) for n in wanted.values())):
-                return found, friction
-        raise AssertionError("friction does not settle")
-
-    def rubbed(self, links: Mapping[str, Link], found: Solution, name: str) -> float:
-        sense = -np.sign(self.rate(links, name)) * self.friction
-        if self.joints[name]["type"] == "revolute":
-            return float(sense * self.parts[name]["pin"]["radius"] * np.hypot(*found.force[name]))
-        axis = slide_of(self.links["ground"], name)
-        across = float(np.real(complex(*found.force[name]) * np.conj(1j * axis)))
-        couple = found.moment[name] / self.parts[name]["guide"]["length"]
-        return float(sense * (abs(across / 2 + couple) + abs(across / 2 - couple)))
-
-    def loads(self, links: Mapping[str, Link], found: Solution, name: str) -> tuple[complex, ...]:
-        """Q of each end: in the axes of the second link; of a guide the components across."""
-        second = self.joints[name]["links"][1]
-        force = complex(*found.force[name]) * np.exp(-1j * links[second].angle)
-        if self.joints[name]["type"] == "revolute":
-            return (force,)
-        across = float(np.real(force * np.conj(1j * slide_of(self.links[second], name))))
-        couple = found.moment[name] / self.parts[name]["guide"]["length"]
-        return (complex(across / 2 - couple), complex(across / 2 + couple))
-
-    def seats(self, links: Mapping[str, Link], found: Solution) -> tuple[Offsets, dict[str, tuple[complex, ...]]]:
-        """Where the loads press the pins."""
-        offsets, loads = {}, {}
-        for name, joint in self.joints.items():
-            rho = self.clearance(name)
-            if rho == 0:
-                continue
-            loads[name] = self.loads(links, found, name)
-            turn = np.exp(1j * np.arctan(self.friction) * np.sign(self.rate(links, name)))
-            turn = turn if joint["type"] == "revolute" else 1
-            offsets[name] = tuple(rho * q / abs(q) * turn for q in loads[name])
-        return offsets, loads
-
-    def solve(self, theta: float, offsets: Offsets) -> tuple[dict[str, Link], Solution, dict[str, float]]:
-        links = self.move(theta, offsets)
-        return links, *self.balance(links, offsets)
-
-    def settle(self, theta: float) -> Settled:
-        """Seats and reactions in turn from the ideal position, until no seat moves by more than 1e-12 ρ."""
-        offsets: Offsets = {}
-        for rounds in range(200):
-            links, found, friction = self.solve(theta, offsets)
-            wanted, loads = self.seats(links, found)
-            change = max(
-                abs(a - b) / self.clearance(name)
-                for name, ends in wanted.items()
-                for a, b in zip(ends, offsets.get(name, (0j,) * len(ends)), strict=True)
-            )
-            if change <= 1e-12:
-                return Settled(offsets, loads, links, found, friction, rounds)
-            offsets = wanted
-        raise AssertionError(f"the seats do not settle: {change:.2g} of the clearance")
-
-    def travelling(self, theta: float) -> Settled:
-        """A position with the whole motion of its links: differences of fourth order of their settled places."""
-        step = 2e-3
-        five = [self.settle(theta + k * step) for k in (-2, -1, 0, 1, 2)]
-        links = {}
-        for name in five[2].links:
-            places = np.array([one.links[name].place for one in five])
-            angles = np.unwrap([one.links[name].angle for one in five])
-            first = np.array([1, -8, 0, 8, -1]) / (12 * step) * self.speed
-            second = np.array([-1, 16, -30, 16, -1]) / (12 * step**2) * self.speed**2
-            links[name] = Link(
-                places[2], first @ places, second @ places, float(angles[2]), first @ angles, second @ angles
-            )
-        found, friction = self.balance(links, five[2].offsets)
-        return replace(five[2], links=links, solution=found, friction=friction)
-
-    def crank(self, theta: float, offsets: Offsets) -> Link:
-        """The driven link: its hole at A, moved by its seat, about the ground's pin."""
-        name = self.joints["A"]["links"][1]
-        angle, rate = theta, self.speed
-        arm = -np.exp(1j * angle) * self.at(name, "A", offsets)
-        ground = local(self.links["ground"], "A")
-        return Link(ground + arm, 1j * rate * arm, -(rate**2) * arm, angle, rate, 0.0)
+def _loads(data: Data, motions: Mapping[str, Motion], oracle: Oracle, found: Solution, name: str) -> Array:
+    """Q of each end in the frame of the hole, where the pin lies in its middle, which the moment counts about."""
+    hole, axes = _hole(data, motions, name), axes_of(data, name)
+    force = hole.axes.T @ found.force[name]
+    loads = np.zeros((len(axes), 3))
+    if len(axes) == 1:
+        loads[0, axes[0]] = force[axes[0]]
+        return loads
+    offset = size_of(data, name).get("offset", 0.0)
+    middle = hole.place + offset * hole.axes[:, 2]
+    _, two = oracle.elements(motions, name)
+    about = two.frame.place + offset * two.frame.axes[:, 2]
+    moment = hole.axes.T @ (found.moment[name] + np.cross(about - middle, found.force[name]))
+    # Q₁ + Q₂ = F across, (H/2) z × (Q₂ − Q₁) = M
+    pair = np.array([moment[1], -moment[0], 0.0]) / length_of(data, name)
+    for end, sign in enumerate((-1, 1)):
+        loads[end, axes[end]] = (force / 2 + sign * pair)[axes[end]]
+    return loads
 
 
-class FourBar(Linkage):
-    """Joints A (ground, crank), B (crank, coupler), C (coupler, rocker), D (ground, rocker); C left of B→D."""
-
-    def move(self, theta: float, offsets: Offsets) -> dict[str, Link]:
-        crank = self.crank(theta, offsets)
-        b_local = self.at("crank", "B", offsets)
-        start, end = crank.point(b_local), local(self.links["ground"], "D")
-        start_rate = crank.velocity + 1j * crank.rate * np.exp(1j * theta) * b_local
-        start_second = crank.accelerated(b_local)
-        rod = self.at("coupler", "C", offsets) - self.at("coupler", "B", offsets)
-        bar = self.at("rocker", "C", offsets) - self.at("rocker", "D", offsets)
-        line = end - start
-        along = (abs(rod) ** 2 - abs(bar) ** 2 + abs(line) ** 2) / (2 * abs(line))
-        pin = start + line / abs(line) * (along + 1j * np.sqrt(abs(rod) ** 2 - along**2))
-        u, v = pin - start, pin - end
-        turns = [np.angle(u / rod), np.angle(v / bar)]
-        # start + u = end + v; u̇ = i ω u
-        A = np.array([[(1j * u).real, -(1j * v).real], [(1j * u).imag, -(1j * v).imag]])
-        rates = np.linalg.solve(A, [-start_rate.real, -start_rate.imag])
-        rest = -start_second + u * rates[0] ** 2 - v * rates[1] ** 2
-        seconds = np.linalg.solve(A, [rest.real, rest.imag])
-        coupler = _hung(
-            start, start_rate, start_second, self.at("coupler", "B", offsets), turns[0], rates[0], seconds[0]
-        )
-        rocker = _hung(end, 0j, 0j, self.at("rocker", "D", offsets), turns[1], rates[1], seconds[1])
-        return {"crank": crank, "coupler": coupler, "rocker": rocker}
+def _hole(data: Data, motions: Mapping[str, Motion], name: str) -> Frame:
+    """The second element where the pin lies in the middle of its hole."""
+    second = data["joints"][name]["links"][1]
+    own = element(data["links"][second], name)
+    return motions[second].frame @ own if second in motions else own
 
 
-class SliderCrank(Linkage):
-    """Joints A (ground, crank), B (crank, rod), P (rod, piston), C (ground, piston; the guide on the ground)."""
-
-    def move(self, theta: float, offsets: Offsets) -> dict[str, Link]:
-        crank = self.crank(theta, offsets)
-        b_local = self.at("crank", "B", offsets)
-        start = crank.point(b_local)
-        start_rate = crank.velocity + 1j * crank.rate * np.exp(1j * theta) * b_local
-        start_second = crank.accelerated(b_local)
-        rod = self.at("rod", "P", offsets) - self.at("rod", "B", offsets)
-        axis, middle = slide_of(self.links["piston"], "C"), local(self.links["piston"], "C")
-        if "C" in offsets:  # the line through the ends of the guide in the piston lies on that of the ground
-            y1, y2 = (end.real for end in offsets["C"])
-            middle = middle + 1j * axis * (y1 + y2) / 2
-            axis = axis * np.exp(1j * np.arctan((y2 - y1) / self.parts["C"]["guide"]["length"]))
-        way = slide_of(self.links["ground"], "C")
-        angle = float(np.angle(way / axis))
-        turn = np.exp(1j * angle)
-        # of the piston's pin: base + s way
-        base = local(self.links["ground"], "C") + turn * (self.at("piston", "P", offsets) - middle)
-        gap = (base - start) * np.conj(way)
-        s = -gap.real + np.sqrt(abs(rod) ** 2 - gap.imag**2)
-        u = base + s * way - start
-        A = np.array([[(1j * u).real, -way.real], [(1j * u).imag, -way.imag]])
-        rate, slide = np.linalg.solve(A, [-start_rate.real, -start_rate.imag])
-        rest = -start_second + u * rate**2
-        second, slide_second = np.linalg.solve(A, [rest.real, rest.imag])
-        origin = local(self.links["ground"], "C") + s * way - turn * middle
-        piston = Link(origin, slide * way, slide_second * way, angle, 0.0, 0.0)
-        turned = float(np.angle(u / rod))
-        hung = _hung(start, start_rate, start_second, self.at("rod", "B", offsets), turned, float(rate), float(second))
-        return {"crank": crank, "rod": hung, "piston": piston}
+def _seat(data: Data, motions: Mapping[str, Motion], loads: Array, oracle: Oracle, name: str) -> Array:
+    """c = ρ n: Q = N (n − μ t), t the way the hole slips past the pin at n; along a guide that turns nothing."""
+    kind, slip = data["joints"][name]["type"], oracle.slip(motions, name)
+    spin = _hole(data, motions, name).axes.T @ slip.spin
+    mu = 0.0 if kind in SLIDING else oracle.coefficient(name)
+    if kind == "cylindrical":  # the share of the friction that acts across the axis
+        mu *= abs(slip.turn) / np.hypot(slip.turn, slip.slide / size_of(data, name)["radius"])
+    seats = np.zeros_like(loads)
+    for end, load in enumerate(loads):
+        n = load / np.linalg.norm(load)
+        seats[end] = _ball_contact(n, mu, spin) if kind == "spherical" else _pin_contact(n, mu, spin[2])
+    return clearance(data, name) * seats
 
 
-def _hung(
-    at: complex, velocity: complex, acceleration: complex, own: complex, angle: float, rate: float, second: float
-) -> Link:
-    """A link of which one point and the turn are known."""
-    r = -np.exp(1j * angle) * own
-    return Link(
-        at + r, velocity + 1j * rate * r, acceleration + (1j * second - rate**2) * r,
-        float(angle), float(rate), float(second),
-    )  # fmt: skip
+def _pin_contact(q: Array, mu: float, rate: float) -> Array:
+    """q turned by atan μ about z, with the hole."""
+    angle = np.arctan(mu) * np.sign(rate)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * q[0] - s * q[1], s * q[0] + c * q[1], 0.0])
 
 
-def _pair(number: complex) -> tuple[float, float]:
-    return float(np.real(number)), float(np.imag(number))
+def _ball_contact(q: Array, mu: float, spin: Array) -> Array:
+    """n with n − μ t ∥ q by substitution; on the pole where q is within atan μ of the spin's axis."""
+    if mu == 0 or not np.any(spin):
+        return q
+    axis = spin / np.linalg.norm(spin)
+    if np.linalg.norm(np.cross(axis, q)) < mu * abs(axis @ q):
+        return np.asarray(np.sign(axis @ q) * axis)
+    n = q
+    for _ in range(500):
+        t = np.cross(axis, n)
+        new = q * np.hypot(1, mu) + mu * t / np.linalg.norm(t)
+        new = new / np.linalg.norm(new)
+        if np.max(np.abs(new - n)) < 1e-15:
+            break
+        n = new
+    return np.asarray(n)

@@ -20,7 +20,8 @@ from hypothesis import strategies as st
 import trunnion
 from brief import brief
 from mechanisms import MODELS, analyse, build, class_three, findings, four_bar
-from mechanisms_parts import Data
+from mechanisms_parts import Data, joined
+from timed import PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.nested import flat
 from trunnion.errors import Severity
@@ -56,12 +57,8 @@ def test_the_list_of_a_four_bar_is_the_two_meets_of_two_circles() -> None:
     choice = choice_of(four_bar())
     along = (0.9**2 - 0.7**2 + 0.7**2) / (2 * 0.7)
     across = np.sqrt(0.9**2 - along**2)
-    assert (choice.label, choice.links, choice.link, choice.where) == (
-        "II(2,3)RRR",
-        ("coupler", "rocker"),
-        "coupler",
-        "",
-    )
+    assert (choice.label, choice.links, choice.link) == ("II(2,3)RRR", ("coupler", "rocker"), "coupler")
+    assert not choice.where
     assert [way.name for way in choice.ways] == ["way-1", "way-2"]
     assert [way.taken for way in choice.ways] == [True, False]
     assert [way.joints["C"] for way in choice.ways] == [
@@ -208,7 +205,10 @@ def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
 @pytest.mark.parametrize(("name", "share"), [("four-bar", 0.7), ("class III", 0.7), ("in space", 0.2)])
 def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
     """Of every assembly the places at a position of the driver select it, though at the start others are nearer."""
-    data = SAID_AT[name]()
+    (a, b, c, d), at = PARALLELOGRAM
+    models = {"four-bar": lambda: build(four_bar()), "class III": lambda: build(class_three()),
+              "in space": lambda: driven_four_bar("spatial", (a, b, c + 0.1, d), at)}  # fmt: skip
+    data = models[name]().data()
     data.pop("assembly", None)
     (choice,) = trunnion.check(Mechanism(**data), 12).choices
     joint = next((joint for joint, place in choice.ways[0].joints.items() if len(place) > 1), "C")
@@ -228,20 +228,6 @@ def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
                 np.testing.assert_allclose(is_, was, atol=1e-9)
 
 
-def in_space_at() -> Data:
-    from timed import PARALLELOGRAM, driven_four_bar
-
-    (a, b, c, d), at = PARALLELOGRAM
-    return driven_four_bar("spatial", (a, b, c + 0.1, d), at).data()
-
-
-SAID_AT: dict[str, Any] = {
-    "four-bar": lambda: build(four_bar()).data(),
-    "class III": lambda: build(class_three()).data(),
-    "in space": in_space_at,
-}
-
-
 def jacked(first: str, **tube: Any) -> Mechanism:
     """An arm on a hinge that a driven strut holds: universal or ball, slide, ball."""
     hinge, slide = {"at": [0, 0, 0], "axis": [0, 1, 0]}, {"at": [0, 0, 0], "axis": [1, 0, 0]}
@@ -254,10 +240,7 @@ def jacked(first: str, **tube: Any) -> Mechanism:
             "tube": {"points": {"U": {"at": [0, 0, 0], **({"axis": [0, 0, 1]} if cross else {})}, "T": slide}, **tube},
             "rod": {"points": {"T": slide, "L": [0.1, 0, 0]}},
         },
-        joints={
-            "H": {"type": "revolute", "links": ["ground", "arm"]}, "U": {"type": first, "links": ["ground", "tube"]},
-            "T": {"type": "prismatic", "links": ["tube", "rod"]}, "L": {"type": "spherical", "links": ["arm", "rod"]},
-        },
+        joints=joined(f"ground -H- arm, ground -U:{first}- tube =T= rod, arm -L:spherical- rod"),
         drivers={"T": {"speed": 0.1, "range": [0.65, 0.75]}},
         loads={"w": {"link": "arm", "at": "W", "force": [10, 20, -300]}},
     )  # fmt: skip
@@ -284,79 +267,53 @@ def test_half_turns_of_a_strut_are_no_assemblies_of_their_own() -> None:
 JOINTS = {"S": "spherical", "R": "revolute", "P": "prismatic", "C": "cylindrical", "U": "universal"}
 
 
-class Drawing:
-    """A linkage that grows by groups between random points, all in one frame."""
-
-    def __init__(self, rng: np.random.Generator, spatial: bool) -> None:
-        self.rng, self.spatial = rng, spatial
-        self.links: dict[str, dict[str, Any]] = {"ground": {}}
-        self.joints: dict[str, Any] = {}
-        self.add("R", ["ground", "crank"], self.place())
-        self.moving = ["crank"]
-
-    def place(self) -> list[float]:
-        return [float(n) for n in self.rng.uniform(-1, 1, 3 if self.spatial else 2)]
-
-    def direction(self) -> list[float]:
-        return [float(n) for n in self.rng.normal(size=3 if self.spatial else 2)]
-
-    def add(self, kind: str, ends: list[str], place: list[float]) -> str:
-        """A joint at a place, on both links alike."""
-        name = f"{kind}{len(self.joints)}"
-        axes: list[dict[str, Any]] = [{}, {}]
-        if (self.spatial and kind != "S") or kind == "P":
-            axis = self.direction()
-            axes = [{"axis": axis}] * 2
-        if kind == "U":
-            axes = [{"axis": axis}, {"axis": [float(n) for n in np.cross(axis, self.direction())]}]
-        self.joints[name] = {"type": JOINTS[kind], "links": ends}
-        for link, more in zip(ends, axes, strict=True):
-            self.links.setdefault(link, {})[name] = {"at": place, **more} if more else place
-        return name
-
-    def anchor(self) -> str:
-        return str(self.rng.choice(list(self.links)))
-
-    def dyad(self, kinds: str) -> None:
-        """Two links, one on the last that moves, the other on any."""
-        first, second = f"link-{len(self.links)}", f"link-{len(self.links) + 1}"
-        ends = [self.moving[-1], first], [first, second], [self.anchor(), second]
-        for kind, pair in zip(kinds, ends, strict=True):
-            self.add(kind, list(pair), self.place())
-        self.moving += [second]
-
-    def triad(self) -> None:
-        """A link on three rods."""
-        body = f"link-{len(self.links)}"
-        for k, anchor in enumerate([self.moving[-1], self.anchor(), "ground"]):
-            rod = f"rod-{len(self.links)}-{k}"
-            self.add("R", [anchor, rod], self.place())
-            self.add("R", [rod, body], self.place())
-        self.moving += [body]
-
-    def mechanism(self, start: float) -> Mechanism:
-        driver = next(iter(self.joints))
-        return Mechanism(
-            space="spatial" if self.spatial else "planar",
-            links={link: {"points": points} for link, points in self.links.items()},
-            joints=self.joints,
-            drivers={driver: {"speed": 1.0, "range": [start, start + 0.3]}},
-        )
-
-
 def drawn(seed: int) -> Mechanism:
-    """Every third in space; some begin before or after where they are drawn."""
-    rng = np.random.default_rng(seed)
-    drawing = Drawing(rng, seed % 3 == 2)
-    if drawing.spatial:
-        drawing.dyad(str(rng.choice(["SSR", "USR", "SCR", "CCC", "RSC"])))
-    else:
-        for _ in range(int(rng.integers(1, 4))):
-            if rng.random() < 0.3:
-                drawing.triad()
-            else:
-                drawing.dyad(str(rng.choice(["RRR", "RRP", "PRR", "RPR"])))
-    return drawing.mechanism(float(rng.choice([0.0, 0.0, -0.02, 0.02])))
+    """A linkage that grows by groups between random points, drawn in one frame for all its links.
+
+    Every third in space; some begin before or after where they are drawn.
+    """
+    rng, spatial = np.random.default_rng(seed), seed % 3 == 2
+    size, last = 3 if spatial else 2, "crank"
+    links: dict[str, Any] = {"ground": {}}
+    joints: dict[str, Any] = {}
+
+    def add(kind: str, *ends: str) -> None:
+        """A joint at a random place, on both links alike."""
+        name, place = f"{kind}{len(joints)}", rng.uniform(-1, 1, size).tolist()
+        axes: list[dict[str, Any]] = [{}, {}]
+        if (spatial and kind != "S") or kind == "P":
+            axis = rng.normal(size=size)
+            other = np.cross(axis, rng.normal(size=size)) if kind == "U" else axis
+            axes = [{"axis": axis.tolist()}, {"axis": other.tolist()}]
+        joints[name] = {"type": JOINTS[kind], "links": list(ends)}
+        for link, more in zip(ends, axes, strict=True):
+            links.setdefault(link, {})[name] = {"at": place, **more} if more else place
+
+    def anchor() -> str:
+        return str(rng.choice(list(links)))
+
+    add("R", "ground", "crank")
+    for _ in range(1 if spatial else int(rng.integers(1, 4))):
+        if not spatial and rng.random() < 0.3:  # a link on three rods
+            body = f"link-{len(links)}"
+            for k, base in enumerate([last, anchor(), "ground"]):
+                rod = f"rod-{len(links)}-{k}"
+                add("R", base, rod)
+                add("R", rod, body)
+            last = body
+        else:  # two links, one on the last that moves, the other on any
+            kinds = rng.choice(["SSR", "USR", "SCR", "CCC", "RSC"] if spatial else ["RRR", "RRP", "PRR", "RPR"])
+            first, second = f"link-{len(links)}", f"link-{len(links) + 1}"
+            for kind, ends in zip(kinds, ((last, first), (first, second), (anchor(), second)), strict=True):
+                add(str(kind), *ends)
+            last = second
+    start = float(rng.choice([0.0, 0.0, -0.02, 0.02]))
+    return Mechanism(
+        space="spatial" if spatial else "planar",
+        links={link: {"points": points} for link, points in links.items()},
+        joints=joints,
+        drivers={next(iter(joints)): {"speed": 1.0, "range": [start, start + 0.3]}},
+    )
 
 
 @pytest.mark.parametrize(("first", "count"), [(0, 12), pytest.param(12, 30, marks=pytest.mark.slow)])
@@ -371,13 +328,10 @@ def test_random_linkages_are_assembled_as_drawn(first: int, count: int) -> None:
             continue
         assert not any(one.code == "assembly.choice" for one in run.chosen.findings), seed
         walk = run.walk(np.array([-start]))
+        same = [*np.eye(3).ravel(), 0.0, 0.0, 0.0] if walk.system.spatial else [0.0, 0.0, 1.0, 0.0]
         for link, motion in walk.motions.items():
-            frame = motion.frame
-            spatial = walk.system.spatial
-            numbers = [n for vector in frame for n in vector] if spatial else list(frame)
-            same = [*np.eye(3).ravel(), 0.0, 0.0, 0.0] if spatial else [0.0, 0.0, 1.0, 0.0]
             if not any(link in spin for module in run.system.plan.modules for spin in module.spinning):
-                values = [float(np.ravel(n)[0]) for n in numbers]
+                values = [float(np.ravel(n)[0]) for n in flat(motion.frame)]
                 np.testing.assert_allclose(values, same, atol=1e-7, err_msg=f"{seed} {link}")
         looked += 1
     assert looked > 0.6 * count

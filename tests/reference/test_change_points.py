@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from brief import brief
 from mechanisms_parts import joined
 from timed import ANTIPARALLELOGRAM, DELTOID, PARALLELOGRAM, driven_four_bar
-from trunnion import Mechanism, analyse, simulate
+from trunnion import Mechanism, Status, analyse, simulate
 from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
@@ -32,11 +32,7 @@ def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, tu
     links["coupler"]["points"]["E"] = list(AT)
     return Mechanism(
         links={"ground": {"points": {"A": [0, 0], "D": [d, 0]}}, **links},
-        joints={
-            name: {"type": "revolute", "links": ends}
-            for name, ends in {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"],
-                               "D": ["ground", "rocker"]}.items()
-        },
+        joints=joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker"),
         drivers={"A": {"speed": 1.0, **where}},
         loads={
             "push": {"link": "coupler", "at": "E", "force": list(PUSH)},
@@ -119,25 +115,17 @@ def hinted(place: Callable[[Array], Array], begin: float) -> dict[str, list[floa
     return {"C": [at.real, at.imag]}
 
 
-def apart(theta: Array, least: float) -> NDArray[np.bool_]:
-    """Angles that are not at a multiple of half a turn."""
-    return np.asarray(np.abs(np.sin(theta)) > least)
-
-
-@pytest.mark.parametrize(
-    ("name", "whole"),
-    [("parallelogram", False), ("antiparallelogram", False), ("kite", True), ("Galloway", False), ("deltoid", True)],
-)
-def test_linkages_go_on_smoothly(name: str, whole: bool) -> None:
-    """Place of C, torque by energy; whole: over as many turns of the crank as bring the links back."""
+@pytest.mark.parametrize("name", LINKAGES)
+def test_linkages_go_on_smoothly(name: str) -> None:
+    """Place of C, torque by energy; of some over as many turns of the crank as bring the links back."""
     sides, place = LINKAGES[name]
-    begin = 0.7
+    begin, whole = 0.7, name in ("kite", "deltoid")
     result = brief(four_bar(*sides, hinted(place, begin), begin, None if whole else 2.0), 500)
     theta = begin + result["time"].values
     assert theta[-1] - begin > 0.99 * TURN * (2 if name == "deltoid" or not whole else 1)
     at = place(theta)
     np.testing.assert_allclose(result["point_position"].sel(point="rocker.C").values, [at.real, at.imag], atol=1e-10)
-    away = apart(theta, 0.02)
+    away = np.abs(np.sin(theta)) > 0.02  # not in line
     wanted = by_energy(sides[0], sides[2], sides[3], place, theta)
     np.testing.assert_allclose(result["drive_effort"].values[0][away], wanted[away], atol=2e-6)
 
@@ -153,17 +141,8 @@ def test_a_linkage_folds_where_that_is_stated() -> None:
     assert "assembly.change_point" in {one.code for one in result.trunnion.findings}
 
 
-def test_positions_in_line_have_no_forces() -> None:
-    """With the status that says so; those beside it have them."""
-    sides, place = LINKAGES["parallelogram"]
-    result = brief(four_bar(*sides, hinted(place, 0.5), 0.0, None), 36)
-    status, effort = result["status"].values, result["drive_effort"].values[0]
-    assert np.flatnonzero(status == 7).tolist() == [0, 18]
-    assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["deltoid", pytest.param("antiparallelogram", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["deltoid", "antiparallelogram"])
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""
     sides, place = LINKAGES[kind]
@@ -175,16 +154,20 @@ def test_in_space(kind: str) -> None:
     assert finding.figures["places"] == (["360°", "720°"] if kind == "deltoid" else ["180°", "360°"])
 
 
-def test_positions_of_a_general_group_where_assemblies_meet_have_no_forces() -> None:
-    """With the status that says so; the motion through them is one."""
-    sides, place = LINKAGES["kite"]
-    data = driven_four_bar("spatial", sides, hinted(place, 0.5)["C"]).data()
-    data["drivers"]["A"] |= {"start": 0.0}
-    data["assembly"]["C"] = [*hinted(place, 0.1)["C"], 0]
-    result = analyse(Mechanism(**data), 36)
-    status, effort = result["status"].values, result["drive_effort"].values[0]
-    assert np.flatnonzero(status == 7).tolist() == [0, 18]
-    assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
+@pytest.mark.parametrize(("name", "space"), [("parallelogram", "planar"), ("kite", "spatial")])
+def test_positions_where_assemblies_meet_have_no_forces(name: str, space: str) -> None:
+    """With the status that says so, also of a general group; those beside them have them: the motion is one."""
+    sides, place = LINKAGES[name]
+    if space == "planar":
+        mechanism = four_bar(*sides, hinted(place, 0.5), 0.0, None)
+    else:
+        data = driven_four_bar(space, sides, hinted(place, 0.5)["C"]).data()
+        data["drivers"]["A"] |= {"start": 0.0}
+        data["assembly"]["C"] = [*hinted(place, 0.1)["C"], 0]
+        mechanism = Mechanism(**data)
+    result = analyse(mechanism, 36)
+    assert np.flatnonzero(result["status"].values == Status.SINGULAR).tolist() == [0, 18]
+    assert np.flatnonzero(np.isnan(result["drive_effort"].values[0])).tolist() == [0, 18]
     assert "assembly.ranges" not in [finding.code for finding in result.trunnion.findings]
 
 
@@ -229,16 +212,15 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
     data["links"]["ground"]["points"]["G"] = [float(d + 3.0), 0.0]
     data["links"]["rod"] = {"points": {"E": [0, 0], "F": [3.0, 0]}}
     data["links"]["last"] = {"points": {"G": [0, 0], "F": [4.0, 0]}}
-    data["joints"] |= joined("coupler -E- rod -F- last, ground -G- last")  # fmt: skip
+    data["joints"] |= joined("coupler -E- rod -F- last, ground -G- last")
     data["assembly"]["rod"] = "way-1"
     return Mechanism(**data)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("first", "count"), [(0, 10), pytest.param(10, 30, marks=pytest.mark.slow)])
-def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated(first: int, count: int) -> None:
-    passed = jumped = 0
-    for seed in range(first, first + count):
+def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated() -> None:
+    passed, jumped, count = 0, 0, 40
+    for seed in range(count):
         mechanism = random_change_point_linkage(np.random.default_rng(seed))
         for folds in (False, True):
             data = mechanism.data()

@@ -12,7 +12,7 @@ import trunnion
 from brief import brief
 from geared import geared_five_bar, geared_loop, planet_drive, rocker_train, screwed_strut
 from mechanisms import Data, analyse, build, model, positions_of
-from mechanisms_parts import joined, prismatic, revolute, slide
+from mechanisms_parts import joined, slide
 from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare
 
@@ -134,8 +134,7 @@ def steering(driver: Data, gear: Data | None = None) -> Data:
 
 
 def at(result: Any, variable: str, axis: str | None = None, **where: str) -> Any:
-    chosen = result[variable].sel(**where, **({"axis": axis} if axis else {}))
-    return chosen.values
+    return result[variable].sel(**where, **({"axis": axis} if axis else {})).values
 
 
 def knuckle_by_hand(rack: Any) -> Any:
@@ -215,7 +214,7 @@ def hoist(**wheel: Any) -> Data:
             "wheel": {"points": {"A": [0, 0]}, "inertia": 0.05},
             "load": {"points": {"S": slide(0, 0, np.pi / 2)}, "mass": 100.0, "useful": True},
         },
-        "joints": {"A": {**revolute("frame", "wheel"), **wheel}, "S": prismatic("frame", "load")},
+        "joints": joined("frame -A- wheel, frame =S= load", A=wheel),
         "gears": {"chain": {"joints": ["A", "S"], "radius": 0.06, "teeth": False}},
         "drivers": {"A": {"speed": np.pi, "range": [0.0, 12.0]}},
     }
@@ -244,7 +243,7 @@ def test_a_falling_load_turns_its_wheel() -> None:
     np.testing.assert_allclose(at(result, "drive_coordinate", driver="A"), -second * time**2 / 2, atol=1e-10)
 
 
-ARM, LEAD, MEAN, LOAD = 0.15, 0.004, 0.006, 5000.0
+MEAN = 0.006  # radius of the thread, m
 
 
 def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Data:

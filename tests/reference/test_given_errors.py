@@ -14,7 +14,7 @@ from mechanisms import MODELS, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
 from mechanisms_space import Drawn, rssr
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, Motion, element, point, rotation
-from reference.seat_oracle_space import moved
+from reference.seat_oracle import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.solve.run import prepare
 

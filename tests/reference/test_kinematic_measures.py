@@ -215,30 +215,25 @@ def test_forces_in_space_are_those_of_the_analysis() -> None:
         np.testing.assert_allclose(course(run, name, time), values, rtol=1e-9, err_msg=name)
 
 
-def measured_model() -> Mechanism:
-    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
-    data["measures"] = {"speed": {"velocity": "rocker.C", "limit": "1 m/s"}}
-    return Mechanism(**data).with_seats("free")
-
-
 def test_play_of_a_speed() -> None:
     """By derivatives of the whole motion, against differences with a pin moved in its hole."""
-    mechanism = measured_model()
-    data = mechanism.data()
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["measures"] = {"speed": {"velocity": "rocker.C", "limit": "1 m/s"}}
+    data = Mechanism(**data).with_seats("free").data()
     on_hole = {name: joint | {"seat_on": joint["links"][1]} for name, joint in data["joints"].items()}
     mechanism = Mechanism(**{**data, "joints": on_hole})
     result = trunnion.play(mechanism, ["speed", "rate:D"], steps=12)
-    run = prepare(mechanism)
+    run, time = prepare(mechanism), result["time"].values
     for row, name in enumerate(("speed", "rate:D")):
         measure = named(mechanism, [name], run.values)[0]
-        one = result["sensitivity"].isel(measure=row)
+        slopes = result["sensitivity"].isel(measure=row)
         for joint in result["joint"].values:
             for axis in "xy":
-                path, time = f"{HOLE}.{joint}.1.{axis}", result["time"].values
+                path = f"{HOLE}.{joint}.1.{axis}"
                 moved = ({**run.values, path: off} for off in (1e-7, -1e-7))
                 ends = [measure.curve(forward(run.system, one, run.chosen.assembly, time))[0] for one in moved]
                 expected = np.broadcast_to((ends[0] - ends[1]) / 2e-7, 12)
-                found = one.sel(joint=joint, end="1", axis=axis).values
+                found = slopes.sel(joint=joint, end="1", axis=axis).values
                 np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
@@ -329,10 +324,6 @@ DURATION = 12.0
 MEASURE = {"starting_time": "A", "duration": DURATION}
 
 
-def stated(mechanism: Mechanism, **more: Any) -> Mechanism:
-    return Mechanism(**{**mechanism.data(), **more})
-
-
 def starting_time(inertia: float) -> float:
     """Of J ω̇ = 4 (1 − ω/150) − 0.6, where the mean of a turn is 95 % of that of the last in DURATION."""
     tau, turn = inertia * 150 / 4, 2 * np.pi
@@ -350,7 +341,8 @@ def starting_time(inertia: float) -> float:
 @pytest.mark.slow
 def test_first_order_of_the_starting_time() -> None:
     """The sensitivity to the inertia, by differences of the closed form; samples scatter about it."""
-    mechanism = stated(wheel(LINEAR), tolerances={"links.wheel.inertia": 0.001}, measures={"start": MEASURE})
+    sections = {"tolerances": {"links.wheel.inertia": 0.001}, "measures": {"start": MEASURE}}
+    mechanism = Mechanism(**{**wheel(LINEAR).data(), **sections})
     found = trunnion.tolerance(mechanism, methods=("linear", "monte-carlo"), samples=100, jobs=1)
     slope = (starting_time(0.0505) - starting_time(0.0495)) / 0.001
     figure, sensitivity = float(found["nominal"].item()), float(np.ravel(found["sensitivity"])[0])
@@ -364,13 +356,11 @@ def test_first_order_of_the_starting_time() -> None:
 @pytest.mark.slow
 def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     """Torques about the drag: half of them do not start."""
-    motor = {**LINEAR, "stall_effort": 0.6}
-    mechanism = stated(
-        wheel(motor),
-        tolerances={"drivers.A.motor.stall_effort": {"limits": "±0.3 N m", "distribution": "uniform"}},
-        measures={"peak": {"peak_effort": "A", "duration": 1.0, "at_most": 5}, "start": {**MEASURE, "at_most": 100}},
-    )
-    found = trunnion.tolerance(mechanism, methods=("monte-carlo",), samples=60, jobs=1)
+    data = wheel({**LINEAR, "stall_effort": 0.6}).data()
+    data["tolerances"] = {"drivers.A.motor.stall_effort": {"limits": "±0.3 N m", "distribution": "uniform"}}
+    peak = {"peak_effort": "A", "duration": 1.0, "at_most": 5}
+    data["measures"] = {"peak": peak, "start": {**MEASURE, "at_most": 100}}
+    found = trunnion.tolerance(Mechanism(**data), methods=("monte-carlo",), samples=60, jobs=1)
     shares = found["yield"].values
     assert shares[0] == 1.0
     assert shares[1] < 0.7

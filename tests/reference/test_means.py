@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms_parts import Data, joined, revolute
+from mechanisms_parts import Data, joined, slide
 from trunnion import Mechanism, analyse
 from trunnion.cycle.summary import balance
 from trunnion.errors import Finding, Status
@@ -23,12 +24,11 @@ from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import Mechanisms, bends
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-STEPS = (60, 720)
 PRESS: dict[str, Any] = {  # of docs/how-to/model-file.md
     "space": "planar",
     "dimensions": {"r": "40 mm", "l": "160 mm", "offset": "60 mm"},
     "links": {
-        "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        "frame": {"points": {"O": [0, 0], "S": slide(0, 0)}},
         "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
         "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
         "ram": {"points": {"Q": [0, 0], "S": {"at": [0, "offset"], "axis": [1, 0]}}},
@@ -62,15 +62,37 @@ def finely(run: Run, cells: int) -> float:
     return float(work[0] / work[1])
 
 
+def bumper() -> Mechanism:
+    """A spring that the ram just touches for some degrees."""
+    data = json.loads(json.dumps(PRESS))
+    data["links"]["frame"]["points"]["W"] = ["230 mm", "60 mm"]
+    spring = {"between": ["frame.W", "ram.Q"], "stiffness": "200 N/mm", "free_length": "38 mm", "damping": "2 N s/mm"}
+    return Mechanism(**data, springs={"bumper": {**spring, "only": "push"}})
+
+
+def example(name: str) -> Mechanism:
+    return trunnion.read(EXAMPLES / f"{name}.yaml")
+
+
 @pytest.mark.spread(1)
-@pytest.mark.parametrize("force", LOADS)
-def test_efficiency_does_not_depend_on_the_number_of_positions(force: str) -> None:
-    mechanism = press(force)
-    found = [trunnion.analyse(mechanism, steps) for steps in STEPS]
-    values = [float(one["efficiency"]) for one in found]
-    np.testing.assert_allclose(values, values[0], rtol=1e-9)
-    assert values[0] == pytest.approx(finely(prepare(mechanism), 360_000), rel=2e-4)
-    assert all(0 <= float(one["efficiency_error"]) < 1e-6 * values[0] for one in found)
+@pytest.mark.parametrize(
+    ("mechanism", "steps", "same", "cells", "close"),
+    [
+        *((lambda force=force: press(force), (60, 720), 1e-9, 360_000, 2e-4) for force in LOADS),
+        (bumper, (60, 720), 1e-7, 200_000, 1e-5),
+        (lambda: example("rssr"), (50, 333), 1e-6, 60_000, 1e-4),
+        (lambda: example("klann"), (50, 333), 1e-6, 60_000, 1e-4),
+    ],
+    ids=["drive", "pulse", "time", "bumper", "rssr", "klann"],
+)
+def test_efficiency_does_not_depend_on_the_number_of_positions(
+    mechanism: Callable[[], Mechanism], steps: tuple[int, int], same: float, cells: int, close: float
+) -> None:
+    found = [trunnion.analyse(mechanism(), count) for count in steps]
+    values = [float(result["efficiency"]) for result in found]
+    assert values[1] == pytest.approx(values[0], rel=same)
+    assert values[0] == pytest.approx(finely(prepare(mechanism()), cells), rel=close)
+    assert same > 1e-9 or all(0 <= float(result["efficiency_error"]) < 1e-6 * values[0] for result in found)
 
 
 @pytest.mark.slow
@@ -84,15 +106,6 @@ def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions
     np.testing.assert_allclose(few["efficiency"], one, rtol=1e-8)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("model", ["rssr", "klann"])
-def test_examples_in_plane_and_space(model: str) -> None:
-    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
-    values = [float(trunnion.analyse(mechanism, steps)["efficiency"]) for steps in (50, 333)]
-    assert values[0] == pytest.approx(values[1], rel=1e-6)
-    assert values[0] == pytest.approx(finely(prepare(mechanism), 60_000), rel=1e-4)
-
-
 def test_a_load_that_no_position_meets_is_in_the_extremes() -> None:
     """Of 72 positions none lies in the 3° of the load; of 3600 thirty do."""
     most = [
@@ -102,20 +115,6 @@ def test_a_load_that_no_position_meets_is_in_the_extremes() -> None:
     assert most[0] == most[1]
     dense = float(trunnion.analyse(press(), 3600)["drive_effort"].max())
     assert dense <= most[0] <= 1.02 * dense
-
-
-@pytest.mark.slow
-def test_one_way_springs_and_laws_part_the_integral() -> None:
-    """A bumper that the slide just touches for some degrees; a table; a dwell."""
-    data = json.loads(json.dumps(PRESS))
-    data["links"]["frame"]["points"]["W"] = ["230 mm", "60 mm"]
-    data["springs"] = {
-        "bumper": {"between": ["frame.W", "ram.Q"], "stiffness": "200 N/mm", "free_length": "38 mm", "only": "push",
-                   "damping": "2 N s/mm"}
-    }  # fmt: skip
-    values = [float(trunnion.analyse(Mechanism(**data), steps)["efficiency"]) for steps in STEPS]
-    np.testing.assert_allclose(values, values[0], rtol=1e-7)
-    assert values[0] == pytest.approx(finely(prepare(Mechanism(**data)), 200_000), rel=1e-5)
 
 
 def test_bends_are_where_the_model_switches() -> None:
@@ -150,40 +149,38 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     assert int(swept["not_valid"][0]) == np.count_nonzero(lost)
 
 
-def test_useful_work_is_that_of_the_loads_marked_so() -> None:
-    """A shaft that turns a mill and a fan takes both torques; useful is what is marked, or all if nothing is."""
+def shaft(driver: Data, body: Data | None = None, **more: Any) -> Mechanism:
     points = {"points": {"A": [0, 0]}}
-    loads = {name: {"joint": "A", "resisting_torque": size} for name, size in (("mill", 6.0), ("fan", 2.0))}
-    shaft = {"space": "planar", "links": {"ground": points, "shaft": points}, "drivers": {"A": {"speed": 5.0}},
-             "joints": {"A": {"type": "revolute", "links": ["ground", "shaft"]}}}  # fmt: skip
-    for marked, share in (("mill", 0.75), ("fan", 0.25), (None, 1.0)):
-        stated = {name: {**load, "useful": True} if name == marked else load for name, load in loads.items()}
-        result = trunnion.analyse(Mechanism(trunnion=1, **shaft, loads=stated), 12)
-        assert float(result["efficiency"]) == pytest.approx(share, rel=1e-12)
-        np.testing.assert_allclose(result["efficiency_instant"], share, rtol=1e-12)
-        np.testing.assert_allclose(result["useful_power"], 40.0 * share, rtol=1e-12)
-        np.testing.assert_allclose(result["drive_effort"], 8.0, rtol=1e-12)
+    links = {"ground": points, "shaft": {**points, **(body or {})}}
+    return Mechanism(links=links, joints=joined("ground -A- shaft"), drivers={"A": driver}, **more)
 
 
-@pytest.mark.parametrize(("load", "spring", "share"), [(False, False, 0.6), (True, True, 1.0), (False, True, 0.4),
-                                                       (True, False, 0.6)])  # fmt: skip
-def test_useful_work_of_a_spring_marked_so(load: bool, spring: bool, share: float) -> None:
-    """A shaft against a brake of 6 N m winds up a spring of 4 N m: all loads count only if nothing is marked."""
-    points = {"points": {"A": [0, 0]}}
-    shaft = Mechanism(
-        trunnion=1,
-        links={"ground": points, "shaft": points},
-        joints={"A": {"type": "revolute", "links": ["ground", "shaft"]}},
-        drivers={"A": {"speed": 5.0, "range": [0.0, 1.0]}},
-        loads={"brake": {"joint": "A", "resisting_torque": 6.0, "useful": load}},
-        springs={"spring": {"joint": "A", "preload": 4.0, "useful": spring}},
-    )
-    result = trunnion.analyse(shaft, 12)
-    np.testing.assert_allclose(result["useful_power"], 50.0 * share, rtol=1e-12)
-    np.testing.assert_allclose(result["drive_power"], 50.0, rtol=1e-12)
+@pytest.mark.parametrize(
+    ("torques", "spring", "marked", "share"),
+    [
+        ({"mill": 6.0, "fan": 2.0}, 0.0, "mill", 0.75),
+        ({"mill": 6.0, "fan": 2.0}, 0.0, "fan", 0.25),
+        ({"mill": 6.0, "fan": 2.0}, 0.0, "", 1.0),
+        ({"brake": 6.0}, 4.0, "", 0.6),
+        ({"brake": 6.0}, 4.0, "brake", 0.6),
+        ({"brake": 6.0}, 4.0, "coil", 0.4),
+        ({"brake": 6.0}, 4.0, "brake coil", 1.0),
+    ],
+)
+def test_useful_work_is_that_of_what_is_marked_so(
+    torques: dict[str, float], spring: float, marked: str, share: float
+) -> None:
+    """Of torques on a shaft and of a spring that it winds up; all loads, and no spring, if nothing is marked."""
+    loads = {name: {"joint": "A", "resisting_torque": size, "useful": name in marked} for name, size in torques.items()}
+    springs = {"coil": {"joint": "A", "preload": spring, "useful": "coil" in marked}} if spring else {}
+    model = shaft({"speed": 5.0, "range": [0.0, 1.0]}, loads=loads, springs=springs)
+    result, run = trunnion.analyse(model, 12), prepare(model)
+    torque = sum(torques.values()) + spring
+    np.testing.assert_allclose(result["drive_effort"], torque, rtol=1e-12)
+    np.testing.assert_allclose(result["useful_power"], 5.0 * torque * share, rtol=1e-12)
+    np.testing.assert_allclose(result["efficiency_instant"], share, rtol=1e-12)
     assert float(result["efficiency"]) == pytest.approx(share, rel=1e-12)
-    run = prepare(shaft)
-    (measure,) = named(shaft, ["efficiency:cycle"], run.values)
+    (measure,) = named(model, ["efficiency:cycle"], run.values)
     useful, driven = measure.curve(run.solve(np.zeros(1)))
     np.testing.assert_allclose(useful / driven, share, rtol=1e-12)
 
@@ -201,11 +198,7 @@ def test_power_residual_is_told_of_the_peak_power() -> None:
 
 def test_root_mean_square_of_an_effort() -> None:
     """Of a crank that lifts a weight the torque is m g r cos φ: its RMS m g r/√2."""
-    links = {"ground": {"points": {"A": [0, 0]}},
-             "crank": {"points": {"A": [0, 0]}, "mass": 2.0, "centre": [0.3, 0], "inertia": 0.0}}  # fmt: skip
-    joints = {"A": {"type": "revolute", "links": ["ground", "crank"]}}
-    crank = Mechanism(trunnion=1, space="planar", links=links, joints=joints, drivers={"A": {"speed": 2.0}},
-                      gravity=[0, -9.81])  # fmt: skip
+    crank = shaft({"speed": 2.0}, {"mass": 2.0, "centre": [0.3, 0], "inertia": 0.0}, gravity=[0, -9.81])
     result = trunnion.analyse(crank, 12)
     (row,) = (row for row in summary_of(result) if row.aspect == "RMS")
     assert row.value == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)
@@ -217,19 +210,11 @@ LIFTED, HELPED, HINDERED = 10.0, 4.0, 5.0  # J: constant forces, N, over a rise 
 def crank(**loads: float) -> list[Finding]:
     """The findings of a crank of 1 m, from level to upright; loads: vertical forces at its end, N; `weight` is useful;
     with `mass` a weight at its end that it lets down instead."""
-    mass = loads.pop("mass", 0.0)
-    points = {"A": [0, 0], "P": [1, 0]}
-    data: Data = {
-        "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": points, "mass": mass, "centre": [1, 0]}},
-        "joints": {"A": revolute("ground", "crank")},
-        "drivers": {"A": {"speed": 1.0, "range": [0.0, pi / 2]}},
-        "gravity": [0.0, 1.0],
-        "loads": {
-            name: {"link": "crank", "at": "P", "force": [0.0, force], "useful": name == "weight"}
-            for name, force in loads.items()
-        },
-    }
-    found = analyse(Mechanism(trunnion=1, **data), steps=8).trunnion.findings
+    body = {"points": {"A": [0, 0], "P": [1, 0]}, "mass": loads.pop("mass", 0.0), "centre": [1, 0]}
+    pushes = {name: {"link": "shaft", "at": "P", "force": [0.0, force], "useful": name == "weight"}
+              for name, force in loads.items()}  # fmt: skip
+    model = shaft({"speed": 1.0, "range": [0.0, pi / 2]}, body, gravity=[0.0, 1.0], loads=pushes)
+    found = analyse(model, steps=8).trunnion.findings
     return [one for one in found if one.code in ("efficiency.above_one", "load.not_counted")]
 
 
@@ -261,14 +246,12 @@ def test_nothing_is_said_where_the_drives_alone_supply_work(loads: dict[str, flo
 G, MASS = 9.81, 1500.0
 
 
-def lift(space: str, friction: float, weight: dict[str, Any], gravity: float, **more: Any) -> Mechanism:
+def lift(space: str, friction: float, weight: dict[str, Any], gravity: float) -> Mechanism:
     """A slider on an inclined guide, driven up it by a motion that begins and ends at rest."""
-    guide = {"guide": {"length": 0.8}}
-    slope = [np.cos(0.6), np.sin(0.6)]
     flat = [0.0] if space == "spatial" else []
     centre = [0.1, 0.3, *flat]
-    element = {"at": [0, 0, *flat], "axis": [*slope, *flat]}
-    load = {"loads": {"weight": {"link": "cage", "at": "C", "force": [0, -MASS * G, *flat], "useful": True}}}
+    element = {"at": [0, 0, *flat], "axis": [np.cos(0.6), np.sin(0.6), *flat]}
+    load = {"weight": {"link": "cage", "at": "C", "force": [0, -MASS * G, *flat], "useful": True}}
     return Mechanism(
         space=space,
         gravity=[0, -gravity, *flat],
@@ -276,10 +259,9 @@ def lift(space: str, friction: float, weight: dict[str, Any], gravity: float, **
             "ground": {"points": {"S": element}},
             "cage": {"points": {"S": element, "C": centre}, "mass": MASS, "centre": centre, **weight},
         },
-        joints={"S": {"type": "prismatic", "links": ["ground", "cage"], "friction": friction, **guide}},
+        joints=joined("ground =S= cage", S={"friction": friction, "guide": {"length": 0.8}}),
         drivers={"S": {"law": "cycloidal", "range": [0, 2], "duration": 4, "returns": False}},
-        **({} if gravity else load),
-        **more,
+        loads={} if gravity else load,
     )
 
 

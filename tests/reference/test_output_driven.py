@@ -11,35 +11,32 @@ import pytest
 import trunnion
 from brief import brief
 from mechanisms import four_bar
-from mechanisms_parts import joined
+from mechanisms_parts import joined, slide
 from trunnion import Mechanism, Status
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.solve.run import prepare
 
 R, L = 0.03, 0.2  # crank and rod of a press, m
 RAM: dict[str, Any] = {"law": "cycloidal", "range": ["180 mm", "225 mm"], "duration": "0.5 s", "dwell": "0.1 s"}
-EXAMPLES = "examples"
 
 
 def press(drivers: dict[str, Any], friction: float = 0.1, **more: Any) -> Mechanism:
     """A crank press: the crank's pin O, the ram's guide S."""
-    return Mechanism(
-        **{
-            "gravity": [0, -9.81],
-            "links": {
-                "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
-                "crank": {"points": {"O": [0, 0], "P": [R, 0]}, "mass": 2.0, "inertia": 1e-3},
-                "rod": {"points": {"P": [0, 0], "Q": [L, 0]}, "mass": 1.0, "centre": [L / 2, 0], "inertia": 3e-3},
-                "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 5.0},
-            },
-            "joints": joined("frame -O- crank -P- rod -Q- ram, frame =S= ram", S={"guide": {"length": 0.15}}),
-            "joint_defaults": {"pin": {"radius": 0.025}, "friction": friction},
-            "drivers": drivers,
-            "loads": {"cut": {"joint": "S", "resisting_force": "5 kN", "useful": True}},
-            "assembly": {"Q": [0.18, 0], "P": [0, 0.03]},
-            **more,
-        }
-    )
+    data: dict[str, Any] = {
+        "gravity": [0, -9.81],
+        "links": {
+            "frame": {"points": {"O": [0, 0], "S": slide(0, 0)}},
+            "crank": {"points": {"O": [0, 0], "P": [R, 0]}, "mass": 2.0, "inertia": 1e-3},
+            "rod": {"points": {"P": [0, 0], "Q": [L, 0]}, "mass": 1.0, "centre": [L / 2, 0], "inertia": 3e-3},
+            "ram": {"points": {"Q": [0, 0], "S": slide(0, 0)}, "mass": 5.0},
+        },
+        "joints": joined("frame -O- crank -P- rod -Q- ram, frame =S= ram", S={"guide": {"length": 0.15}}),
+        "joint_defaults": {"pin": {"radius": 0.025}, "friction": friction},
+        "drivers": drivers,
+        "loads": {"cut": {"joint": "S", "resisting_force": "5 kN", "useful": True}},
+        "assembly": {"Q": [0.18, 0], "P": [0, 0.03]},
+    }
+    return Mechanism(**{**data, **more})
 
 
 def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
@@ -62,13 +59,16 @@ def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
 @pytest.mark.parametrize(("example", "driver", "moved"), [("watt-six-bar", "", ""), ("four-bar", "A", "D")])
 def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str, moved: str) -> None:
     """Without friction the effort times the rate of the driver is that of a driver at the joint that moves."""
-    data = four_bar() if example == "four-bar" else trunnion.read(f"{EXAMPLES}/{example}.yaml").data()
+    data = four_bar() if example == "four-bar" else trunnion.read(f"examples/{example}.yaml").data()
     data["joint_defaults"] = {}
     data["joints"] = {name: {**joint, "friction": 0} for name, joint in data["joints"].items()}
     plain = Mechanism(**data)
     driver = driver or next(iter(plain.drivers))
     start = brief(plain, steps=360)
-    moved = moved or _swinging(plain, driver)
+    moved = moved or next(
+        name for name, joint in plain.joints.items()
+        if plain.fixed_link in joint.links and name != driver and joint.type == "revolute"
+    )  # fmt: skip
     begin = float(start.joint_rotation.sel(joint=moved)[30])
     law = {"law": "cycloidal", "duration": 1.0, "returns": False,
            "range": [begin, float(start.joint_rotation.sel(joint=moved)[45])]}  # fmt: skip
@@ -83,15 +83,6 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
     assert found.joint_rotation.sel(joint=moved).values == pytest.approx(
         driven.joint_rotation.sel(joint=moved).values, abs=1e-11
     )
-
-
-def _swinging(mechanism: Mechanism, driver: str) -> str:
-    """A joint to the ground that is not the driver's."""
-    ground = mechanism.fixed_link
-    return next(
-        name for name, joint in mechanism.joints.items()
-        if ground in joint.links and name != driver and joint.type == "revolute"
-    )  # fmt: skip
 
 
 def test_a_hand_that_two_drivers_move() -> None:
@@ -114,8 +105,6 @@ def hand() -> dict[str, Any]:
     x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
     bars = {"left": ("A", "B", 0.4, 0.15), "right": ("D", "C", 0.4, 0.15), "rod": ("B", "H", 0.3, 0.18),
             "other": ("C", "J", 0.3, 0.18)}  # fmt: skip
-    pins = {"A": "ground left", "D": "ground right", "B": "left rod", "C": "right other", "H": "rod hand",
-            "J": "other hand"}  # fmt: skip
     links: dict[str, Any] = {
         one: {"points": {near: [0, 0], far: [length, 0]}, "mass": mass, "centre": [length / 2, 0], "inertia": 1e-3}
         for one, (near, far, mass, length) in bars.items()
@@ -125,9 +114,7 @@ def hand() -> dict[str, Any]:
         "sledge": {"points": {"X": x, "Y": y}, "mass": 1},
         "hand": {"points": {"Y": y, "H": [0, 0], "J": [0, 0]}, "mass": 2.0},
     }
-    joints = {name: {"type": "revolute", "links": pair.split()} for name, pair in pins.items()}
-    joints |= {"X": {"type": "prismatic", "links": ["ground", "sledge"]},
-               "Y": {"type": "prismatic", "links": ["sledge", "hand"]}}  # fmt: skip
+    joints = joined("ground -A- left -B- rod -H- hand, ground -D- right -C- other -J- hand, ground =X= sledge =Y= hand")
     return {
         "gravity": [0, -9.81],
         "links": links,

@@ -17,29 +17,21 @@ Array = NDArray[np.float64]
 UPPER, LOWER = [0.1, 0.3, 0.8], [0.5, 0.05, 0.1]
 
 
-def arm(slide: str | None, driver: str = "H", **parts: Any) -> Mechanism:
-    """An arm on a hinge with a strut to the ground; without one a spring between the same points."""
-    links: dict[str, Any] = {
-        "ground": {"points": {"H": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "U": UPPER}},
-        "arm": {"points": {"H": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "L": LOWER, "W": [0.6, 0, 0.05]}},
-    }
-    joints: dict[str, Any] = {"H": {"type": "revolute", "links": ["ground", "arm"]}}
-    if slide:
-        links["tube"] = {"points": {"U": [0, 0, 0], "T": {"at": [0.2, 0, 0], "axis": [1, 0, 0]}}}
-        links["rod"] = {"points": {"T": {"at": [-0.1, 0, 0], "axis": [1, 0, 0]}, "L": [0.15, 0, 0]}}
-        joints |= {
-            "U": {"type": "spherical", "links": ["ground", "tube"]}, "T": {"type": slide, "links": ["tube", "rod"]},
-            "L": {"type": "spherical", "links": ["arm", "rod"]},
-        }  # fmt: skip
-    for name, more in parts.items():
-        links[name] |= more
-    ranges = {"H": {"speed": 1.0, "range": [-0.3, 0.4]}, "T": {"speed": 0.1, "range": [0.3, 0.4]}}
-    spring = {"between": ["ground.U", "arm.L"], "stiffness": 2e3, "free_length": 0.9}
+def arm() -> Mechanism:
+    """An arm on a hinge, held by a spring between the same points as a strut would be."""
+    hinge = {"at": [0, 0, 0], "axis": [0, 1, 0]}
     return Mechanism(
-        space="spatial", links=links, joints=joints, drivers={driver: ranges[driver]}, gravity=[0, 0, -9.81],
+        space="spatial",
+        links={
+            "ground": {"points": {"H": hinge, "U": UPPER}},
+            "arm": {"points": {"H": hinge, "L": LOWER, "W": [0.6, 0, 0.05]}},
+        },
+        joints=joined("ground -H- arm"),
+        drivers={"H": {"speed": 1.0, "range": [-0.3, 0.4]}},
+        gravity=[0, 0, -9.81],
         loads={"w": {"link": "arm", "at": "W", "force": [10, 20, -300]}},
-        springs={} if driver == "T" else {"s": spring},
-    )  # fmt: skip
+        springs={"s": {"between": ["ground.U", "arm.L"], "stiffness": 2e3, "free_length": 0.9}},
+    )
 
 
 def codes(result: Any) -> list[str]:
@@ -49,16 +41,16 @@ def codes(result: Any) -> list[str]:
 def leg(kind: str, seed: int, driver: dict[str, Any] | None = None) -> Mechanism:
     """The arm with a leg whose inner joint stands anywhere between its balls; driven, it is a jack."""
     rng = np.random.default_rng(seed)
-    data = arm("prismatic").data()
+    data = arm().data()
     lower, upper = {"revolute": (0.5, 0.6), "prismatic": (0.2, 0.15)}[kind]
     off = rng.uniform(-0.04, 0.04, (4, 3))
     axes = np.array([0.0, 0.0, 1.0]) + rng.uniform(-0.4, 0.4, (2, 3)) if kind == "revolute" else [[1.0, 0, 0]] * 2
     points = [off[0], off[1] + [lower, 0, 0], off[2], off[3] + [upper, 0, 0]]
     for link, first, second, axis in (("tube", "U", "T", axes[0]), ("rod", "T", "L", axes[1])):
         places = {first: points[0 if link == "tube" else 2], second: points[1 if link == "tube" else 3]}
-        data["links"][link]["points"] = {name: place.tolist() for name, place in places.items()}
+        data["links"][link] = {"points": {name: place.tolist() for name, place in places.items()}}
         data["links"][link]["points"]["T"] = {"at": places["T"].tolist(), "axis": list(map(float, axis))}
-    data["joints"]["T"]["type"] = kind
+    data["joints"] |= joined(f"ground -U:spherical- tube -T:{kind}- rod, arm -L:spherical- rod")
     if driver:
         data["drivers"], data["springs"] = {"T": driver}, {}
     return Mechanism(**data)
@@ -71,7 +63,7 @@ JACKS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("kind", JACKS)
 def test_an_idle_leg_changes_nothing(kind: str) -> None:
-    bare = brief(arm(None), 9)
+    bare = brief(arm(), 9)
     result = analyse(leg(kind, 1), 9)
     assert codes(result).count("mobility.spin") == 1
     np.testing.assert_allclose(result["drive_effort"], bare["drive_effort"], rtol=1e-12)
@@ -141,14 +133,10 @@ def wishbone() -> Mechanism:
     }
     drawn["tube"] = {"points": {"U": [0, 0, 0], "T": {"at": [0, 0, 0], "axis": [1, 0, 0]}}}
     drawn["rod"] = {"points": {"T": {"at": [0, 0, 0], "axis": [1, 0, 0]}, "L": [0, 0, 0]}}
-    ends = {"E": "lower upright", "F": "upper upright", "M": "ground tie", "N": "tie upright", "U": "ground tube",
-            "L": "rod lower"}  # fmt: skip
-    joints: dict[str, Any] = {name: {"type": "spherical", "links": pair.split()} for name, pair in ends.items()}
-    joints |= {
-        "A": {"type": "revolute", "links": ["ground", "lower"]},
-        "B": {"type": "revolute", "links": ["ground", "upper"]},
-        "T": {"type": "prismatic", "links": ["tube", "rod"]},
-    }
+    joints = joined(
+        "lower -E:spherical- upright, upper -F:spherical- upright, ground -M:spherical- tie -N:spherical- upright, "
+        "ground -U:spherical- tube =T= rod -L:spherical- lower, ground -A- lower, ground -B- upper"
+    )
     return Mechanism(
         space="spatial", links=drawn, joints=joints,
         drivers={"T": {"speed": 0.01, "range": [length - 0.02, length + 0.02]}},

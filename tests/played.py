@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+import toleranced
 from mechanisms import Array
 from mechanisms_parts import Data
+from toleranced import fourbar
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
@@ -32,7 +34,7 @@ __all__ = [
 ]  # fmt: skip
 
 Loads = dict[str, list[Vector]]  # load at each end, by joint
-RSSR = {"a": 0.03, "b": 0.12, "c": 0.07, "d": 0.1, "alpha": np.pi / 3, "s1": 0.01, "s4": 0.02}
+FROM_60 = {"A": {"speed": 1.0, "start": np.radians(60)}}
 
 
 def with_play(data: Data, clearance: float = 1e-5, float_: float = 0.0) -> Mechanism:
@@ -91,53 +93,19 @@ def changes(run: Run, measure: Measure, offsets: Mapping[str, Array], time: Arra
 
 def four_bar(joint: str, clearance: float = 2e-5) -> Mechanism:
     """Links of 100, 30, 90, 70 mm, crank from 60°, play in one joint."""
-    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
-    joints: Data = {name: {"type": "revolute", "links": links} for name, links in ends.items()}
-    joints[joint]["pin"] = {"radius": 0.005, "clearance": clearance}
-    return Mechanism(
-        trunnion=1,
-        links={
-            "ground": {"points": {"A": [0, 0], "D": [0.1, 0]}},
-            "crank": {"points": {"A": [0, 0], "B": [0.03, 0]}},
-            "coupler": {"points": {"B": [0, 0], "C": [0.09, 0]}},
-            "rocker": {"points": {"D": [0, 0], "C": [0.07, 0]}},
-        },
-        joints=joints,
-        drivers={"A": {"speed": 1.0, "start": np.radians(60)}},
-        assembly={"C": [0.1, 0.07]},
-    )
+    data = fourbar(tolerances={}, measures={}, drivers=FROM_60).data()
+    data["joints"][joint]["pin"] = {"radius": 0.005, "clearance": clearance}
+    return Mechanism(**data)
 
 
 def rssr(clearance: float = 2e-5, float_: float = 0.0, hole_on: str = "rocker") -> Mechanism:
     """The RSSR linkage with a pin and hole at its output: 20 mm long, the middle on the common normal."""
-    k, s4 = [0, -np.sin(RSSR["alpha"]), np.cos(RSSR["alpha"])], RSSR["s4"]
     pin: Data = {"radius": 0.01, "hole_radius": 0.01 + clearance, "length": 0.02}
-    if float_:
-        pin["end_float"] = float_
-    links = ["ground", "rocker"] if hole_on == "rocker" else ["rocker", "ground"]
-    return Mechanism(
-        trunnion=1,
-        space="spatial",
-        links={
-            "ground": {
-                "points": {
-                    "A": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]},
-                    "D": {"at": [RSSR["d"], 0, 0], "axis": k, "x": [1, 0, 0]},
-                }
-            },
-            "crank": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "B": [0.03, 0, 0.01]}},
-            "rod": {"points": {"B": [0, 0, 0], "C": [RSSR["b"], 0, 0]}},
-            "rocker": {"points": {"D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "C": [RSSR["c"], 0, s4]}},
-        },
-        joints={
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "B": {"type": "spherical", "links": ["crank", "rod"]},
-            "C": {"type": "spherical", "links": ["rod", "rocker"]},
-            "D": {"type": "revolute", "links": links, "pin": pin},
-        },
-        drivers={"A": {"speed": 1.0, "start": np.radians(60)}},
-        assembly={"D": np.radians(74) * (1 if hole_on == "rocker" else -1)},
-    )
+    data = toleranced.rssr(pin | ({"end_float": float_} if float_ else {}), {}, measures={}, drivers=FROM_60).data()
+    if hole_on == "ground":
+        data["joints"]["D"]["links"] = ["rocker", "ground"]
+        data["assembly"] = {"D": -np.radians(74)}
+    return Mechanism(**data)
 
 
 # ---- what an offset does, two ways beside the batch of the study ------------------------------------------------

@@ -24,15 +24,12 @@ def wheel(motor: dict[str, Any] | None = None, drag: float = 0.6, grease: float 
 LINEAR = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150}
 
 
-def two_wheels(motor: dict[str, Any], **driver: Any) -> Mechanism:
+def two_wheels(motor: dict[str, Any]) -> Mechanism:
     """That flywheel, whose joint has a constant loss, and another one beside it that runs down."""
-    data = wheel(motor, drag=0.0, **driver).data()
-    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
-    links["ground"] = {"points": {"A": [0, 0], "W": [1, 1]}}
-    joints = {**data["joints"], "W": {"type": "revolute", "links": ["ground", "disc"], "losses": {"constant": 0.3}}}
-    joints["A"] = {**joints["A"], "losses": {"constant": 0.6}}
-    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": 5}}}
-    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers})
+    data = beside(wheel(motor, drag=0.0), 5).data()
+    for joint, loss in (("A", 0.6), ("W", 0.3)):
+        data["joints"][joint]["losses"] = {"constant": loss}
+    return Mechanism(**data)
 
 
 def three_posts() -> Mechanism:
@@ -170,7 +167,7 @@ DELTOID = (0.4, 1.0, 1.0, 0.4), [0.9, 0.8]
 INERTIA = 2 * (0.01 + 0.15**2) + 0.3**2
 
 
-def beside(mechanism: Mechanism) -> Mechanism:
+def beside(mechanism: Mechanism, speed: float = 3) -> Mechanism:
     """The same beside a wheel of its own that is free, too."""
     data = mechanism.data()
     flat = mechanism.space == "planar"
@@ -178,7 +175,7 @@ def beside(mechanism: Mechanism) -> Mechanism:
     data["links"]["disc"] = {"points": {"W": [0, 0] if flat else in_space([0, 0])},
                              "inertia": 0.05 if flat else {"xx": 0.1, "yy": 0.1, "zz": 0.1}}  # fmt: skip
     data["joints"]["W"] = {"type": "revolute", "links": ["ground", "disc"]}
-    data["drivers"]["W"] = {"speed": 1, "free": True, "initial": {"speed": 3}}
+    data["drivers"]["W"] = {"speed": 1, "free": True, "initial": {"speed": speed}}
     return Mechanism(**data)
 
 

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.sparse import csc_matrix
 
 from mechanisms_parts import joined
-from timed import wheel
+from timed import beside, wheel
 from trunnion.dynamics.simulate import simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import summary_of
@@ -275,17 +275,6 @@ def test_several_accelerations_are_told(torque: float, rough: float, known: int)
 
 
 # ---- rest -----------------------------------------------------------------------------------------------------
-
-
-def beside(one: Mechanism, speed: float = 3.0) -> Mechanism:
-    """A mechanism with a wheel beside it, that is free as well."""
-    data = one.data()
-    ground = one.fixed_link
-    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
-    links[ground] = {**links[ground], "points": {**links[ground]["points"], "W": [1, 1]}}
-    joints = {**data["joints"], "W": {"type": "revolute", "links": [ground, "disc"], "friction": 0}}
-    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": speed}}}
-    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers})
 
 
 def wheels(motor: dict[str, Any] | None = None, speed: float = 3.0) -> Mechanism:

@@ -10,9 +10,9 @@ import xarray as xr
 
 import trunnion
 from brief import brief
-from mechanisms_parts import joined
 from reference.maximal_space import Array, Data, Frame, rotation, unrolled
 from spatial_numbers import apart
+from toleranced import RSSR, rssr
 from trunnion.algebra.dual import Dual, functions, parts, primal, spatial
 from trunnion.algebra.lines import line, link
 from trunnion.algebra.vector import product, transpose
@@ -80,27 +80,6 @@ def test_rccc(general: bool) -> None:
     assert missed(result, data["loop"]) < 1e-12
 
 
-RSSR = {"a": 0.030, "b": 0.120, "c": 0.070, "d": 0.100, "alpha": np.pi / 3, "s1": 0.010, "s4": 0.020}
-
-
-def rssr(hint: float, **driver: Any) -> Data:
-    """With named dimensions, massless; the angle of the rocker near the start tells the assembly."""
-    return {
-        "space": "spatial",
-        "dimensions": dict(RSSR),
-        "links": {
-            "ground": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]},
-                                  "D": {"at": ["d", 0, 0], "axis": [0, "-sin(alpha)", "cos(alpha)"], "x": [1, 0, 0]}}},
-            "crank": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "B": ["a", 0, "s1"]}},
-            "rod": {"points": {"B": [0, 0, 0], "C": ["b", 0, 0]}},
-            "rocker": {"points": {"D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "C": ["c", 0, "s4"]}},
-        },
-        "joints": joined("ground -A- crank -B:spherical- rod -C:spherical- rocker, ground -D- rocker"),
-        "drivers": {"A": {"speed": SPEED, **driver}},
-        "assembly": {"D": hint},
-    }  # fmt: skip
-
-
 def rocker_angle(theta: Array, branch: int, **other: float) -> tuple[Array, Array]:
     """ψ of E cos ψ + F sin ψ = G, which is |B − A|² = b² written out, and dψ/dθ of the same equation."""
     a, b, c, d, alpha, s1, s4 = {**RSSR, **other}.values()
@@ -121,7 +100,8 @@ def rocker_angle(theta: Array, branch: int, **other: float) -> tuple[Array, Arra
 def test_rssr(branch: int, degrees: float) -> None:
     """ψ on both branches, at 60° as published for this project and over the whole turn by its quadratic equation."""
     start = rocker_angle(np.array([0.0]), branch)[0][0]
-    result = analysed(rssr(float(start)), 72)
+    model = rssr(tolerances={}, measures={}, drivers={"A": {"speed": SPEED}}, assembly={"D": float(start)})
+    result = brief(model, 72)
     theta = np.arange(72) * 2 * np.pi / 72
     psi, slope = rocker_angle(theta, branch)
     np.testing.assert_allclose(turned(result, "D"), np.exp(1j * psi), rtol=0, atol=1e-12)

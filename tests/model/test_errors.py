@@ -254,7 +254,7 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
         (PLAYING, "joints.A.seat", "tight", "'tight' is not one of 'free' or 'loaded'"),
         (PLAYING, "joints.A.seat", [1, 2], "takes free, loaded or a group"),
         (PLAYING, "fits", "meen", "'minimum', 'mean' or 'maximum'"),
-        (SLIDER, "O.pin.hole_radius", "11 mm", "a fit states radius and clearance already"),
+        (SLIDER, "O.pin.hole_radius", "11 mm", "joints.O.pin.fit: is stated beside hole_radius"),
         (RSSR, "D.seat.beta", "181 deg", "is 181 deg, which is not at least -180 deg and at most 180 deg"),
     ],
 )
@@ -266,7 +266,7 @@ def test_what_does_not_go_together_is_refused() -> None:
     twice = {"errors.AB": 1e-5, "errors.dimensions.AB": 1e-5}
     assert "'dimensions.AB' and 'AB' are the same number" in refusal(FOURBAR, twice)
     both = {"B.pin.hole_radius": "8 mm", "B.pin.clearance": "1 um"}
-    assert "by its radius and by the clearance" in refusal(FOURBAR, both)
+    assert "joints.B.pin.hole_radius: is stated beside clearance" in refusal(FOURBAR, both)
     ball = {"B.pin.clearance": "1 um", "B.seat.xi": 1}
     assert "joints.B.seat.xi: a spherical joint in space has its seat stated by a direction" in refusal(RSSR, ball)
     assert RSSR.with_values({"A.misalignment.tilt": "45 deg"})  # the limit itself, whatever it rounds to
@@ -280,10 +280,10 @@ RSSR_PIN = {key: value for key, value in RSSR.data()["joints"]["D"]["pin"].items
     [
         (SLIDER, "S", {"seat": "loaded", "guide": {"clearance": "10 um"}, "friction": 0}, "joints.S: a seat without"),
         (RSSR, "D", {"pin": RSSR_PIN, "friction": 0}, "joints.D: a seat without the length of the pin"),
-        (PLAYING, "A", {"seat": {}}, "joints.A.seat: states no position"),
+        (PLAYING, "A", {"seat": {}}, "joints.A.seat: states nothing"),
         (PLAYING, "B", {"seat_on": "frame"}, "joints.B.seat_on: 'frame' is no link of this joint"),
         (SLIDER, "S", {"seat_on": "frame"}, "joints.S.seat_on: a prismatic joint in the plane needs none"),
-        (PLAYING, "B", {"seat": {"xi": 0.5}, "seat_on": PLAYING.joints["B"].links[0]}, "keep one of seat and seat_on"),
+        (PLAYING, "B", {"seat": {"xi": 0.5}, "seat_on": PLAYING.joints["B"].links[0]}, "or its seat is stated"),
         *((RSSR, "A", {"type": kind, "seat": "loaded", "friction": 0, "pin": {}}, f"a {kind} joint in space has no pl")
           for kind in ("universal", "planar", "fixed")),
         (RSSR, "A", {"type": "helical", "pitch": 1e-3, "seat": "loaded", "pin": {}}, "in space has no play that"),

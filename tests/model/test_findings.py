@@ -87,7 +87,7 @@ MISTAKES = {
         "at: C": [("at: E", "loads.work.at", "has no point 'E'")],
         "point: coupler.C": [("point: coupler.Q", "measures.tip.point", "no point 'coupler.Q'")],
         "{point: coupler.C, axis: x}": [
-            ("{effort: B}", "measures.tip.effort", "no driver 'B'"), ("{}", "measures.tip", "measures nothing"),
+            ("{effort: B}", "measures.tip.effort", "no driver 'B'"), ("{}", "measures.tip", "states nothing"),
             ("{point: coupler.C}", "measures.tip", "along an axis")],
         "axis: x": [("axis: z", "measures.tip.axis", "no z in the plane")],
         "type: revolute, links: [ground, crank]": [
@@ -96,18 +96,18 @@ MISTAKES = {
         "type: revolute, links: [ground, rocker]": [
             ("type: prismatic, links: [ground, rocker]", "links.ground.points.D", "has no axis, a prismatic", -13)],
         "D: [AD, 0]": [("D: {at: [AD, 0], axis: [0, 0]}", "links.ground.points.D.axis", "no direction")],
-        ", force: [0, -1 kN]": [("", "loads.work", "this load is empty")],
-        "link: coupler, at: C": [("at: coupler.C", "loads.work", "neither or both")],
+        ", force: [0, -1 kN]": [("", "loads.work", "states nothing")],
+        "link: coupler, at: C": [("at: coupler.C", "loads.work", "states nothing")],
         "radius: 7.5 mm": [("diameter: 15 mm", "joint_defaults.pin.diameter", "unknown")],
-        "link: coupler, at: C, ": [("", "loads.work", "neither or both of a link and a joint")],
-        "at: C, ": [("", "loads.work", "no point to act at")],
+        "link: coupler, at: C, ": [("", "loads.work", "states nothing")],
+        "at: C, ": [("", "loads.work.force", "no effect without at")],
         "force: [0, -1 kN]": [
             ("moment: [0, 0, 1 N m]", "loads.work.moment", "one number"),
-            ("resisting_torque: 1 N m", "loads.work", "acts on a joint")],
+            ("resisting_torque: 1 N m", "loads.work.resisting_torque", "beside link")],
         "link: coupler, at: C, force: [0, -1 kN]": [
             ("joint: A, resisting_force: 1 N",
              "loads.work.resisting_force", "a revolute joint has no slide to resist"),
-            ("joint: A, at: C, force: [0, 1]", "loads.work", "are for a load on a link")],
+            ("joint: A, at: C, force: [0, 1]", "loads.work.at", "beside joint")],
         "{radius: 7.5 mm}": [
             ("{length: 7.5 mm}", "joints.A", "friction without the radius of the pin", -5),
             ("{radius: 0}", "joint_defaults.pin.radius", "is 0, where friction needs it")],
@@ -122,11 +122,11 @@ MISTAKES = {
             ("links: [ground, crank], pin: {fit: H7/g6}}", "joints.A.pin.fit", "'H7/g6' has no diameter"),
             ("links: [ground, crank], pin: {fit: 20H7/g6}}", "joints.A.pin.fit", "'20' has no unit"),
             ("links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}",
-             "joints.A.pin", "states radius and clear")],
+             "joints.A.pin.fit", "beside radius")],
     },
     VARIED: {
         "model: power, B: 1, k: 0.45": [
-            ("B: 1, k: 0.45", "costs.AB", "states no cost"),
+            ("B: 1, k: 0.45", "costs.AB", "states nothing"),
             ("model: power, process: boring, B: 1, k: 1", "costs.AB", "model and process"),
             ("model: power, B: -1, k: 0.45", "costs.AB.B", "is -1, which is negative"),
             ("model: power, B: 1, k: 0", "costs.AB.k", "is 0")],
@@ -143,7 +143,7 @@ MISTAKES = {
             ("  dimensions.AB: {model", "costs.dimensions.AB", "are the same")],
         "model: power, B: 1, k: 1, unit: m": [("process: boring", "costs.A.clearance.process", "a play has no IT")],
         "{process: boring}": [
-            ("{process: boring, B: 1}", "costs.CD.B", "no effect on a choice"),
+            ("{process: boring, B: 1}", "costs.CD.B", "beside process"),
             ("{process: boring, group: bores}", "costs.AB.group", "has formulas and choices", -2)],
         "{process: boring}\n  AD: {": [
             ("{process: boring, group: g}\n  AD: {group: g, ",
@@ -203,7 +203,7 @@ MISTAKES = {
             ("{angle: rocker, at_least: 2, at_most: 1}", "at_least", "at least 2"),
             ("{locking_margin: mechanism, at_least: 12}", "at_least", "up to 10")],
         "{angle: rocker, at: 60 deg,": [
-            ("{angle: rocker, at: 60 deg, over: [0, 1],", "theta", "both a position"),
+            ("{angle: rocker, at: 60 deg, over: [0, 1],", "theta.over", "beside at"),
             ("{angle: rocker, at: 60 deg, as: rms,", "theta.as", "of a range")],
         "over: [0 deg, 180 deg]": [("over: [0 deg, 1 s]", "swing.over", "from angle to time")],
     },
@@ -435,7 +435,7 @@ INERTIA = ("links", "cross", "inertia")
         (changed("ground", to="wall"), "ground", "there is no link 'wall'"),
         ({**changed("links", "wall", to={}), "ground": "wall"}, "ground", "'wall' is not a link of the loop"),
         (changed("loads", "weight", "at", to="b1"), "loads.weight.at", "the link 'cross' has no point 'b1'"),
-        (changed("loads", "screw", "resisting_torque", to=1), "loads.screw", "a rotation and a slide at once"),
+        (changed("loads", "screw", "resisting_torque", to=1), "loads.screw.resisting_torque", "beside resisting_force"),
         (changed("springs", "pull", "between", to=["cross.tip", "ground.b"]), "springs.pull.between", "'ground.b'"),
         (changed("assembly", "fork.a", to=[0, 0, 0]), "assembly.fork.a", "there is no point 'fork.a'"),
         (changed("joint_defaults", "pin", "bearing", to=None), "joints.a", "without the length of the bearing"),

@@ -22,7 +22,6 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.csv_text import cells_of, heading, numbered, separator_of, units_below
 from trunnion.model.expression import literal
 from trunnion.model.names import nearest
-from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, KINDS, NUMBER, Kind, UnitError, dimension_text, unit
 
 __all__ = [
@@ -32,10 +31,12 @@ __all__ = [
 
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 1_000_000  # of a file, and of all that a model names
 MAX_ROWS = 10_000  # points of a spline; an analysis of 360 positions then takes seconds
 MAX_OWN_ROWS = 20_000  # of all files that a model names: reading them takes some seconds
-SHOWN = 8  # findings about one file; the rest is counted
+MOST_FILES = 50
+SHOWN = 8  # findings about one file
+OF_A_FILE = ("file", "columns")  # the keys of a table or driver whose points are in a file
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
 Row = tuple[int, list[str]]  # line and cells
@@ -51,30 +52,35 @@ class TablePoints(NamedTuple):
 
 
 def with_points(
-    data: Mapping[str, Any], files: TableFiles, model: Path | None = None
+    data: Mapping[str, Any], files: TableFiles | None = None, model: Path | None = None
 ) -> tuple[dict[str, Any], list[TablePoints]]:
     """Plain data of a model with the points of drivers and tables replaced by those of files.
 
-    files: by name of a driver or table; a driver of another motion law becomes one of law `table`. model: the file of
-    the data, whose drivers and tables name files in its folder. MechanismError with every finding: about a name where
-    it stands in the model, about the content with file and line.
+    files: by name of a driver or table; a driver of another motion law becomes one of law `table`. model: instead of
+    these, the file of the data, whose drivers and tables name files in its folder. MechanismError with every finding:
+    about a name where it stands in the model, about the content with file and line.
     """
-    changed, read = dict(data), list[TablePoints]()
-    findings: list[Finding] = []
-    own = [(f"{section}.{key}", file) for section, key, file in stated_files(data)] if model else []
-    for name, file in [*files.items(), *own[: MOST_FILES + 1]]:
+    own = {f"{section}.{key}": file for section, key, file in stated_files(data)} if model else {}
+    changed, read, findings = dict(data), list[TablePoints](), list[Finding]()
+    for name, file in (files or own).items():
         try:
             section, key = _holder(data, name)
+            entry, where = changed[section][key], f"{section}.{key}"
             path, label, columns = Path(file), str(file), None
-            if model and name not in files:
-                path, columns = _own_file(data[section][key], f"{section}.{key}", model, read, len(own))
-                label = str(model.parent / file)
-            points = _points(path, f"{section}.{key}.points", _kinds(data, section, key), label, columns)
+            if model:
+                path, label, columns = _own_path(entry, where, model), str(model.parent / file), entry.get("columns")
+                size = path.stat().st_size + sum(Path(points.file).stat().st_size for points in read)
+                rows = sum(len(points.rows) for points in read)
+                if len(own) > MOST_FILES or size > MAX_BYTES or rows > MAX_OWN_ROWS:
+                    what = f"the files that the model names are too many or too long: more than {MOST_FILES} files, "
+                    what += f"over {MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
+                    findings.append(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))
+                    break
+            points = _points(path, f"{where}.points", _kinds(data, section, key), label, columns)
         except MechanismError as error:
             findings += error.findings
             continue
         read.append(points)
-        entry = changed[section][key]
         rest = {k: value for k, value in entry.items() if k not in OF_A_FILE} if isinstance(entry, Mapping) else {}
         if section == "drivers" and rest.get("law") != "table":
             rest = {"law": "table"}
@@ -84,23 +90,15 @@ def with_points(
     return changed, read
 
 
-def _own_file(
-    entry: Mapping[str, Any], where: str, model: Path, read: Sequence[TablePoints], count: int
-) -> tuple[Path, Sequence[str] | None]:
-    """The file that an entry names, and the headers of its columns. read, count: of all that the model names."""
+def _own_path(entry: Mapping[str, Any], where: str, model: Path) -> Path:
+    """The file that an entry of a model names; MechanismError for keys that do not go with it."""
     names = entry.get("columns")
     if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
         what, remedy = "is not the headers of two columns", "write two texts: columns: [time, pressure]"
         raise MechanismError(Finding(what, f"{where}.columns", remedy))
     if "points" in entry:
         raise MechanismError(Finding("states both points and a file", where))
-    path = in_folder(model.resolve().parent, entry["file"], f"{where}.file")
-    size = path.stat().st_size + sum(Path(points.file).stat().st_size for points in read)
-    if count > MOST_FILES or size > MAX_BYTES or sum(len(points.rows) for points in read) > MAX_OWN_ROWS:
-        what = f"the files that the model names are too many or too long: more than {MOST_FILES} files, over "
-        what += f"{MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
-        raise MechanismError(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))
-    return path, names
+    return in_folder(model.resolve().parent, entry["file"], f"{where}.file")
 
 
 def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> list[Finding]:
@@ -109,31 +107,25 @@ def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> 
     for points in read:
         of_points = [finding for finding in placed if f"{finding.where}.".startswith(f"{points.where}.")]
         placed = [finding for finding in placed if finding not in of_points]
-        indices = [finding.where[len(points.where) + 1 :].partition(".")[0] for finding in of_points]
-        lines = [points.lines[int(index) if index.isdecimal() else 0] for index in indices]
-        placed += _few([finding.at(points.file, line) for finding, line in zip(of_points, lines, strict=True)])
+        for finding in of_points[:SHOWN]:
+            index = finding.where[len(points.where) + 1 :].partition(".")[0]
+            placed.append(finding.at(points.file, points.lines[int(index) if index.isdecimal() else 0]))
     return placed
-
-
-def _few(findings: list[Finding]) -> list[Finding]:
-    """The first few findings, and how many more there are."""
-    if len(findings) <= SHOWN:
-        return findings
-    more = Finding(f"and {len(findings) - SHOWN} more like these", findings[0].where)
-    return [*findings[:SHOWN], more.at(findings[0].file, findings[SHOWN].line)]
 
 
 def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
     """Section and name of the driver or table that a name means; `drivers.A` and `tables.A` tell two apart."""
     parts = {section: part for section in ("drivers", "tables") if isinstance(part := data.get(section), Mapping)}
     holders = [(section, key) for section in parts for key in parts[section] if name in (key, f"{section}.{key}")]
-    if len(holders) == 2:
-        what, remedy = f"'{name}' is a driver and a table", f"say drivers.{name} or tables.{name}"
-        raise MechanismError(Finding(what, remedy=remedy))
+    if len(holders) == 1:
+        return holders[0]
+    what, remedy = f"'{name}' is a driver and a table", f"say drivers.{name} or tables.{name}"
     if not holders:
-        remedy = nearest(name, [key for part in parts.values() for key in part])
-        raise MechanismError(Finding(f"there is no driver or table '{name}'", remedy=remedy))
-    return holders[0]
+        what, remedy = (
+            f"there is no driver or table '{name}'",
+            nearest(name, [key for part in parts.values() for key in part]),
+        )
+    raise MechanismError(Finding(what, remedy=remedy))
 
 
 def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]:
@@ -204,21 +196,21 @@ def _columns(
         heads, units = list[str](), [""] * len(rows[0][1])
         if names or not any(_number(cell, separator) for cell in rows[0][1]):
             heads, units = map(list, zip(*(heading(cell, unit, names or ()) for cell in rows[0][1]), strict=True))
-            if names and len(rows) > 1 and (below := units_below(units, rows[1][1])):
+        if names:
+            if len(rows) > 1 and (below := units_below(units, rows[1][1])):
                 units = below
                 del rows[1]
-        if names:
             units, rows = _named_columns(rows, heads, units, names)
         if len(units) != len(kinds):
             what = f"has {counted(len(units), 'column')}, a {noun} has {len(kinds)}"
             raise MechanismError(Finding(what, remedy=columns, line=rows[0][0]))
-        _check_units(rows[0], units, kinds)
         numbers = rows[1:] if heads else rows
         if len(numbers) < 2:
             what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a {noun} needs two"
             raise MechanismError(Finding(what, remedy=f"add rows such as {example}", line=rows[-1][0]))
-        if findings := list(_unreadable(numbers, separator, len(kinds))):
-            raise MechanismError(_few(findings))
+        findings = _wrong_units(rows[0], units, kinds) or _unreadable(numbers, separator, len(kinds))
+        if findings:
+            raise MechanismError(findings[:SHOWN])
     except MechanismError as error:
         raise MechanismError([finding.at(label, finding.line) for finding in error.findings]) from None
     return units, [(line, [_number(cell, separator) for cell in cells]) for line, cells in numbers]
@@ -233,7 +225,8 @@ def _named_columns(
     """
     line, header = rows[0]
     places: list[int] = []
-    findings: list[Finding] = []
+    findings = [Finding(f"has {len(cells)} cells, the header has {len(header)}", line=number)
+                for number, cells in rows[1:] if len(cells) > len(header)]  # fmt: skip
     for name in names:
         fitting = [i for i, cell in enumerate(header) if cell == name]
         fitting = fitting or [i for i, head in enumerate(heads) if head == name]
@@ -242,11 +235,8 @@ def _named_columns(
             remedy = nearest(name, heads) if not fitting else "give each column a name of its own"
             findings.append(Finding(what, remedy=remedy, line=line))
         places += fitting[:1]
-    for number, cells in rows[1:]:
-        if len(cells) > len(header):
-            findings.append(Finding(f"has {len(cells)} cells, the header has {len(header)}", line=number))
     if findings:
-        raise MechanismError(_few(findings))
+        raise MechanismError(findings[:SHOWN])
     picked = [(number, [cells[i] if i < len(cells) else "" for i in places]) for number, cells in rows]
     return [units[i] for i in places], picked
 
@@ -266,34 +256,34 @@ def _number(cell: str, separator: str) -> str:
     return text if _NUMBER.fullmatch(text) and abs(float(text)) < float("inf") else ""
 
 
-def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> Iterator[Finding]:
-    """What is no pair of numbers, or no number in a single column."""
-    for line, cells in rows:
-        if len(cells) != columns:
-            yield Finding(f"has {counted(len(cells), 'cell')}, the rows before have {columns}", line=line)
-            continue
-        for cell in (cell for cell in cells if not _number(cell, separator)):
-            what = f"'{cell[:40]}' is not a finite number" if cell else "a number is missing"
-            yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
-
-
-def _check_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> None:
-    """MechanismError if the units of a header are not those of the columns."""
-    line, cells = header
+def _wrong_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> list[Finding]:
+    """Units of a header that are not those of the columns."""
     findings = []
-    for cell, text, kind in zip(cells, units, kinds, strict=True):
+    for cell, text, kind in zip(header[1], units, kinds, strict=True):
         try:
-            quantity = Quantity.read(f"1 {text}")
-            if quantity.names:  # an expression such as [-Infinity]
-                raise UnitError(f"the unit '{text}' is not known")
-            if text and not kind.accepts(dimension := quantity.check({})):
+            dimension = unit(text)[1] if text else None
+            if not kind.accepts(dimension):
                 what = f"its unit is that of {dimension_text(dimension or NUMBER)}, the column is of {kind.name}"
                 raise UnitError(what)
         except UnitError as error:
             remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
-            findings.append(Finding(f"{cell[:40]}: {error.what[:120]}", remedy=remedy, line=line))
-    if findings:
-        raise MechanismError(findings)
+            findings.append(Finding(f"{cell[:40]}: {error.what[:120]}", remedy=remedy, line=header[0]))
+    return findings
+
+
+def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> list[Finding]:
+    """Rows that are no pair of numbers, or no number in a single column."""
+    findings = []
+    for line, cells in rows:
+        bad = [cell for cell in cells if not _number(cell, separator)]
+        if len(cells) != columns:
+            what = f"has {counted(len(cells), 'cell')}, the rows before have {columns}"
+            findings.append(Finding(what, line=line))
+        elif bad:
+            what = f"'{bad[0][:40]}' is not a finite number" if bad[0] else "a number is missing"
+            remedy = "write a number such as 12.5 or 1.25e1, units in the header"
+            findings.append(Finding(what, remedy=remedy, line=line))
+    return findings
 
 
 def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:
@@ -307,28 +297,26 @@ def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:
             raise MechanismError(Finding("is not a file", remedy=f"name {kind}"))
         with path.open("rb") as stream:
             raw = stream.read(limit + 1)
-        if len(raw) > limit:
-            what = f"has {max(path.stat().st_size, len(raw)) / 1e6:.1f} MB, {kind} at most {limit / 1e6:.1f} MB"
-            raise MechanismError(Finding(what, remedy=f"check that it is {kind}, or make it smaller"))
+        size = max(path.stat().st_size, len(raw)) / 1e6
+        text = raw.decode("utf-8-sig") if len(raw) <= limit else ""
     except MechanismError:
         raise
-    except (OSError, ValueError) as error:
-        reason = str(getattr(error, "strerror", None) or error)
-        raise MechanismError(Finding(f"cannot be read: {reason}", remedy="check the path")) from error
-    try:
-        text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         what = f"is not UTF-8 text (byte {error.start})"
         raise MechanismError(Finding(what, remedy="save it as UTF-8", line=line)) from error
+    except (OSError, ValueError) as error:
+        reason = str(getattr(error, "strerror", None) or error)
+        raise MechanismError(Finding(f"cannot be read: {reason}", remedy="check the path")) from error
+    if len(raw) > limit:
+        what = f"has {size:.1f} MB, {kind} at most {limit / 1e6:.1f} MB"
+        raise MechanismError(Finding(what, remedy=f"check that it is {kind}, or make it smaller"))
     if not text.strip():
         raise MechanismError(Finding("is empty", remedy=start_from, line=1))
     return text
 
 
-MOST_FILES = 50
 MOST_SIGNS = 200  # of a name
-OF_A_FILE = ("file", "columns")  # the keys of a table or driver whose points are in a file
 _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(10))}  # of Windows
 
 
@@ -348,27 +336,25 @@ def in_folder(folder: Path, name: str, where: str) -> Path:
 
     where: the entry that states it.
     """
-
-    def refused(what: str, remedy: str) -> MechanismError:
-        return MechanismError(Finding(f"'{name[:60]}' {what}", where, remedy))
-
     parts = PureWindowsPath(name)  # knows both kinds of slash, and drives
-    here = "put the file into the folder of the model and give its name, such as gas.csv"
+    odd = len(name) > MOST_SIGNS or not name.strip() or not name.isprintable() or "\\" in name
     device = any(part.split(".")[0].strip().upper() in _DEVICES for part in parts.parts)
-    odd = len(name) > MOST_SIGNS or not name.strip() or not name.isprintable() or "\\" in name or device
+    remedy = "put the file into the folder of the model and give its name, such as gas.csv"
+    what = ""
     if parts.drive or parts.root or ".." in parts.parts:
-        raise refused("leads out of the folder of the model", here)
-    if odd or parts.suffix.lower() != ".csv":
-        raise refused("is no name of a CSV file that every system reads, with / between folders", here)
-    try:
-        home = folder.resolve()
-        path = (home / name).resolve()
-        if not path.is_relative_to(home):
-            raise refused("leads out of the folder of the model by a link", here)
-        if not path.is_file():
-            raise refused("is no file in the folder of the model", f"put it into {home}, or correct the name")
-    except MechanismError:
-        raise
-    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a folder that may not be entered
-        raise refused("cannot be reached", f"check it: {getattr(error, 'strerror', None) or error}") from None
-    return path
+        what = "leads out of the folder of the model"
+    elif odd or device or parts.suffix.lower() != ".csv":
+        what = "is no name of a CSV file that every system reads, with / between folders"
+    else:
+        try:
+            home = folder.resolve()
+            path = (home / name).resolve()
+            if not path.is_relative_to(home):
+                what = "leads out of the folder of the model by a link"
+            elif path.is_file():
+                return path
+            else:
+                what = "is no file in the folder of the model"
+        except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a folder that may not be entered
+            what = f"cannot be reached: {getattr(error, 'strerror', None) or error}"
+    raise MechanismError(Finding(f"'{name[:60]}' {what}", where, remedy))

@@ -115,8 +115,13 @@ def _read_only(value: Any) -> Any:
 
 
 class Part(BaseModel):
-    """An entry of a model file: immutable, its groups of entries too; an unknown key is an error."""
+    """An entry of a model file: immutable, its groups of entries too; an unknown key is an error.
 
+    one_of: keys of which it states exactly one; some_of: keys of which it states at least one.
+    """
+
+    one_of: ClassVar[tuple[str, ...]] = ()
+    some_of: ClassVar[tuple[str, ...]] = ()
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
 
     def __setattr__(self, name: str, value: Any) -> None:

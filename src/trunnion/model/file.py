@@ -57,7 +57,7 @@ def read_model(
     findings = [version_finding.at(str(path), 1) for version_finding in version_findings(data)]
     data, read = with_points(data, tables or {})
     try:
-        data, own_points = with_points(data, {}, path)
+        data, own_points = with_points(data, model=path)
         read += own_points
         model = build(data)
     except MechanismError as error:

@@ -38,7 +38,7 @@ from trunnion.model.quantity import (
     Quantity,
     TorsionalStiffness,
 )
-from trunnion.model.rules import NotNegative, NotZero, OnlyWith, Positive, Refers, Selects, Within
+from trunnion.model.rules import NotNegative, NotWith, NotZero, OnlyWith, Positive, Refers, Selects, Within
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
@@ -114,11 +114,11 @@ class Pin(Part):
     """
 
     radius: Annotated[Length | None, NotNegative] = None
-    hole_radius: Annotated[Length | None, NotNegative] = None
+    hole_radius: Annotated[Length | None, NotNegative, NotWith("clearance")] = None
     length: Annotated[Length | None, NotNegative] = None
     bearing: Annotated[Length | None, NotNegative] = None
     clearance: Annotated[Length | None, NotNegative] = None
-    fit: FitText | None = None
+    fit: Annotated[FitText | None, NotWith("radius", "hole_radius", "clearance")] = None
     offset: Length | None = None
     cylindricity: Annotated[Length | None, NotNegative] = None
     end_float: Annotated[Length | None, NotNegative] = None
@@ -150,7 +150,7 @@ class Contact(Part):
 
     law: Annotated[str, OneOf(CONTACT_LAWS, "contact law"), LAW] = "restitution"
     restitution: Annotated[Dimensionless | None, Within(0, 1)] = None
-    stiffness: Annotated[AnyQuantity | None, Positive] = None
+    stiffness: Annotated[AnyQuantity | None, Positive, NotWith("modulus")] = None
     exponent: Annotated[Dimensionless | None, Within(1, 10)] = None
     modulus: Annotated[Pressure | None, Positive] = None
     poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]"), MATERIAL] = None
@@ -181,9 +181,11 @@ class Seat(Part):
     the cosines of these aside); direction: of a ball, in the frame of the joint on the second link.
     """
 
+    some_of = ("beta", "xi", "direction")
+
     beta: Annotated[Angle | None, Within(-math.pi, math.pi)] = None
     xi: Angle | None = None
-    direction: Direction | None = None
+    direction: Annotated[Direction | None, NotWith("beta", "xi")] = None
 
     def complete(self) -> Seat:
         """With zeros for the angles that were not stated, unless a direction is."""
@@ -251,6 +253,8 @@ class Losses(Part):
 
     constant: torque or force against the motion, an interval at rest; viscous: the same per speed.
     """
+
+    some_of = ("constant", "viscous")
 
     constant: Annotated[ForceOrMoment | None, NotNegative] = None
     viscous: Annotated[Damping | None, NotNegative] = None

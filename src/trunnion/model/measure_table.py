@@ -14,16 +14,10 @@ from trunnion.model.entry import Direction, Part
 from trunnion.model.expression import Expression, parse
 from trunnion.model.limits import LimitText
 from trunnion.model.quantity import AnyQuantity
-from trunnion.model.rules import InSpace, Positive
+from trunnion.model.rules import InSpace, NotWith, Positive
 from trunnion.model.units import KINDS, Kind, UnitError
 
-__all__ = [
-    "MEASURES",
-    "STATISTICS",
-    "Measure",
-    "MeasureKind",
-    "Statistic",
-]
+__all__ = ["MEASURES", "STATISTICS", "Measure", "MeasureKind", "Statistic"]
 
 
 @dataclass(frozen=True)
@@ -217,11 +211,13 @@ class Measure(_Subject):
     every position. `limit` is of its deviation from nominal, `at_least` and `at_most` are of the number itself.
     """
 
+    one_of = tuple(MEASURES)
+
     axis: Literal["x", "y", "z"] | None = _described(
         "which coordinate of a point, or component of a velocity, an acceleration or a reaction; of an angle in "
         "space, the global axis that the link turns about"
     )
-    along: Annotated[Direction | None, InSpace()] = _described(
+    along: Annotated[Direction | None, InSpace(), NotWith("axis")] = _described(
         "direction of the component, global axes, any length; instead of `axis`"
     )
     at: AnyQuantity | None = _described(
@@ -236,7 +232,7 @@ class Measure(_Subject):
     within: tuple[AnyQuantity, AnyQuantity] | None = _described(
         "the band of `as: dwell`, from its lower to its upper end"
     )
-    over: tuple[AnyQuantity, AnyQuantity] | None = _described(
+    over: Annotated[tuple[AnyQuantity, AnyQuantity] | None, NotWith("at")] = _described(
         "the range of it, two coordinates of the first driver or two times; the whole motion if not given"
     )
     duration: Annotated[AnyQuantity | None, Positive] = _described(

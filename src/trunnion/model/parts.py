@@ -39,7 +39,18 @@ from trunnion.model.quantity import (
     Stiffness,
     Time,
 )
-from trunnion.model.rules import InSpace, NotNegative, NotZero, OnlyWith, Positive, Refers, Rising, Selects, Within
+from trunnion.model.rules import (
+    InSpace,
+    NotNegative,
+    NotWith,
+    NotZero,
+    OnlyWith,
+    Positive,
+    Refers,
+    Rising,
+    Selects,
+    Within,
+)
 from trunnion.model.units import KINDS
 
 __all__ = [
@@ -243,22 +254,30 @@ class Load(Part):
     joints (`S.slide`, `S.slide_velocity`) and coordinates of points (`ram.Q.x`, `ram.Q.velocity_x`).
     """
 
+    one_of = ("link", "joint")
+    some_of = ("force", "moment", "resisting_torque", "resisting_force")
+
     link: Annotated[str | None, Refers("link")] = None
-    at: str | None = None
-    force: Annotated[tuple[Force, ...], Field(min_length=2, max_length=3), InSpace()] | None = None
-    moment: (
+    at: Annotated[str | None, NotWith("joint")] = None
+    force: Annotated[
+        Annotated[tuple[Force, ...], Field(min_length=2, max_length=3), InSpace()] | None,
+        OnlyWith("at"),
+        NotWith("joint"),
+    ] = None
+    moment: Annotated[
         Annotated[
             Annotated[Moment, Tag(":value")]
             | Annotated[tuple[Moment, ...], Field(min_length=3, max_length=3), Tag(":list")],
             forms("one moment (planar) or [x, y, z]"),
         ]
-        | None
-    ) = None
-    frame: Literal["global", "link"] = "global"
+        | None,
+        NotWith("joint"),
+    ] = None
+    frame: Annotated[Literal["global", "link"], NotWith("joint")] = "global"
     joint: Annotated[str | None, Refers("any joint")] = None
-    resisting_torque: Annotated[Moment | None, NotNegative] = None
-    resisting_force: Annotated[Force | None, NotNegative] = None
-    only: Literal["positive", "negative"] | None = None
+    resisting_torque: Annotated[Moment | None, NotNegative, NotWith("link", "resisting_force")] = None
+    resisting_force: Annotated[Force | None, NotNegative, NotWith("link")] = None
+    only: Annotated[Literal["positive", "negative"] | None, NotWith("link")] = None
     useful: bool = False
 
 
@@ -289,21 +308,21 @@ class Spring(Part):
     One that only pulls does so while it is longer than its free length, one that only pushes while it is shorter.
     """
 
+    one_of = ("between", "joint")
+    some_of = ("stiffness", "damping", "preload")
+
     between: Annotated[tuple[str, str] | None, Refers("point")] = None
     joint: Annotated[str | None, Refers("any joint")] = None
     stiffness: Annotated[Stiffness | None, NotNegative] = None
-    free_length: Annotated[Length | None, NotNegative] = None
-    free_angle: Angle | None = None
+    free_length: Annotated[Length | None, NotNegative, OnlyWith("stiffness")] = None
+    free_angle: Annotated[Angle | None, OnlyWith("stiffness")] = None
     damping: Annotated[Damping | None, NotNegative] = None
     preload: ForceOrMoment | None = None
-    only: Literal["pull", "push"] | None = None
+    only: Annotated[Literal["pull", "push"] | None, OnlyWith("stiffness")] = None
     useful: bool = False
 
 
 USUAL_PRESSURE_ANGLE = Quantity.read("20 deg", KINDS["angle"])
-
-
-_TEETH = OnlyWith("teeth")
 
 
 class Gear(Part):
@@ -315,13 +334,15 @@ class Gear(Part):
     screw).
     """
 
+    one_of = ("ratio", "radius", "lead")
+
     joints: Annotated[tuple[str, str], Refers("any joint", distinct=True)]
     ratio: Annotated[Dimensionless | None, NotZero("the second joint would not turn at all")] = None
     radius: Annotated[Length | None, NotZero("the rack would not move at all")] = None
     lead: Annotated[Length | None, NotZero("the nut would not move at all")] = None
     phase: AngleOrLength = Quantity(0, KINDS["angle"])
-    teeth: bool = True
-    pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)"), _TEETH] = None
+    teeth: Annotated[bool, NotWith("lead")] = True  # a screw has no pitch point
+    pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)"), OnlyWith("teeth"), NotWith("lead")] = None
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""

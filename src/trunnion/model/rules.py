@@ -21,8 +21,8 @@ from trunnion.model.names import nearest
 from trunnion.model.units import KINDS, Kind
 
 __all__ = [
-    "Directed", "InSpace", "NotNegative", "NotZero", "OnlyWith", "Positive", "Refers", "Rising", "Selects", "Within",
-    "faults", "group_findings", "key_findings", "limit_findings", "markers", "stray",
+    "Directed", "InSpace", "NotNegative", "NotWith", "NotZero", "OnlyWith", "Positive", "Refers", "Rising", "Selects",
+    "Within", "faults", "group_findings", "key_findings", "limit_findings", "markers", "stray",
 ]  # fmt: skip
 
 ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than it
@@ -137,8 +137,9 @@ class Rising(Rule):
 
 def group_findings(path: str, part: BaseModel, values: Values) -> Iterator[Finding]:
     """Findings about fields of several numbers, of a part and of what is in it."""
-    for where, _, key, rule in _ruled(path, part, Directed | Rising):
-        yield from rule.check(f"{where}.{key}", values)
+    for where, inner in _parts(path, part):
+        for key, rule in _stated_rules(inner, Directed | Rising):
+            yield from rule.check(f"{where}.{key}", values)
 
 
 # ---- of names and keys ----------------------------------------------------------------------------------------
@@ -196,6 +197,19 @@ class OnlyWith(Rule):
             yield Finding(f"has no effect without {self.words or self.key}", f"{where}.{key}")
 
 
+class NotWith(Rule):
+    """A key that is not stated beside any of some others."""
+
+    def __init__(self, *keys: str) -> None:
+        self.keys = keys
+
+    def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """A finding if one of the others is stated."""
+        others = [other for other in self.keys if getattr(part, other) is not None]
+        if key in part.model_fields_set and others:
+            yield Finding(f"is stated beside {' and '.join(others)}", f"{where}.{key}", "state one of them")
+
+
 @dataclass(frozen=True, eq=False)
 class Selects(Rule):
     """A word that says which other keys of its part are needed, and which have an effect.
@@ -233,11 +247,16 @@ def stray(
 
 
 def key_findings(model: Any) -> Iterator[Finding]:
-    """Findings about names and keys, of every part of a model: its joints with their defaults."""
+    """Findings about names and keys, of every part of a model as it is stated."""
     sections = {key: getattr(model, key) for key in type(model).model_fields if key not in ("joints", "loop")}
-    every = {**sections, "joints": model.effective_joints}
-    for where, part, key, rule in _ruled("", model, Refers | InSpace | OnlyWith | Selects, every):
-        yield from rule.findings(key, part, where, model)
+    for where, part in _parts("", model, {**sections, "joints": model.stated_joints}):
+        for key, rule in _stated_rules(part, Refers | InSpace | OnlyWith | NotWith | Selects):
+            yield from rule.findings(key, part, where, model)
+        for keys, alone in ((part.one_of, True), (part.some_of, False)):
+            several = [key for key in keys if getattr(part, key) is not None]
+            if keys and (not several or (alone and len(several) > 1)):
+                remedy = f"state {'one' if alone else 'at least one'} of {', '.join(keys)}"
+                yield Finding(f"states {' and '.join(several) or 'nothing'}", where, remedy)
 
 
 # ---- where rules stand ----------------------------------------------------------------------------------------
@@ -260,19 +279,17 @@ def _marked(annotation: Any) -> Iterator[Any]:
             yield from _marked(form)
 
 
-def _ruled(
-    path: str, value: object, kinds: Any, below: Mapping[str, object] | None = None
-) -> Iterator[tuple[str, BaseModel, str, Any]]:
-    """The fields with rules of some kinds that state something, of a part and of every part in it.
+def _stated_rules(part: BaseModel, kinds: Any) -> Iterator[tuple[str, Any]]:
+    """The rules of some kinds of the keys that a part states, with the key."""
+    for key, rules in markers(type(part)).items():
+        yield from ((key, rule) for rule in rules if isinstance(rule, kinds) and getattr(part, key) is not None)
 
-    Where the part stands, the part, the key and the rule. below: what is in it, if not what its fields hold.
-    """
+
+def _parts(path: str, value: object, below: Mapping[str, object] | None = None) -> Iterator[tuple[str, Any]]:
+    """A part and every part in it, with the path of each. below: what is in it, if not what its fields hold."""
     if isinstance(value, BaseModel):
-        for key, rules in markers(type(value)).items():
-            for rule in rules:
-                if isinstance(rule, kinds) and getattr(value, key) is not None:
-                    yield path, value, key, rule
+        yield path, value
         below = below or {key: getattr(value, key) for key in type(value).model_fields}
     for key, item in (below or (value if isinstance(value, Mapping) else {})).items():
         if isinstance(item, BaseModel | Mapping):
-            yield from _ruled(f"{path}.{key}".lstrip("."), item, kinds)
+            yield from _parts(f"{path}.{key}".lstrip("."), item)

@@ -16,7 +16,7 @@ from trunnion.joints.fits import GRADES
 from trunnion.model.entry import Name, OneOf, Part, ShortForm, problem
 from trunnion.model.limits import Limits, LimitText
 from trunnion.model.quantity import AnyQuantity, Dimensionless
-from trunnion.model.rules import NotNegative, Positive, Refers, Selects, Within
+from trunnion.model.rules import NotNegative, NotWith, Positive, Refers, Selects, Within
 
 __all__ = [
     "COST_MODELS", "DISTRIBUTIONS", "OPTIONS", "Correlation", "Cost", "CostOption", "Grade", "Process", "Variation",
@@ -117,13 +117,15 @@ class Cost(Part):
     among the IT grades of a process; and `options`, a choice among ways to make it.
     """
 
+    one_of = ("model", "process", "options")
+
     model: Annotated[str, OneOf(COST_MODELS, "cost model"), _FORMULA] | None = None
-    A: Dimensionless | None = None
-    B: Annotated[Dimensionless | None, NotNegative] = None
-    k: Annotated[Dimensionless | None, Positive] = None
-    unit: str | None = None
-    least: Annotated[AnyQuantity | None, NotNegative] = None
-    most: Annotated[AnyQuantity | None, Positive] = None
+    A: Annotated[Dimensionless | None, NotWith("process", "options")] = None
+    B: Annotated[Dimensionless | None, NotNegative, NotWith("process", "options")] = None
+    k: Annotated[Dimensionless | None, Positive, NotWith("process", "options")] = None
+    unit: Annotated[str | None, NotWith("process", "options")] = None
+    least: Annotated[AnyQuantity | None, NotNegative, NotWith("process", "options")] = None
+    most: Annotated[AnyQuantity | None, Positive, NotWith("process", "options")] = None
     group: Name | None = None
     process: Annotated[str | None, Refers("process")] = None
     options: Annotated[Mapping[Name, CostOption], Field(min_length=1)] | None = None

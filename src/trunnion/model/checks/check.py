@@ -164,12 +164,8 @@ def _links(mechanism: Varying) -> Iterator[Finding]:
         (not no_links and not jointed, "joints", "there are no joints", "join the links"),
         (not mechanism.fixed_link, "ground", "no link is fixed", remedy),
     )
-    for name, link in mechanism.links.items():
-        where = f"links.{name}"
-        if name not in jointed:
-            yield Finding(f"no joint connects the link '{name}'", where, "join it to another link or remove it")
-        if link.inertia_about == "origin" and "inertia" not in link.model_fields_set:
-            yield Finding("inertia_about is given without an inertia", where, "", Severity.WARNING)
+    for name in (name for name in mechanism.links if name not in jointed):
+        yield Finding(f"no joint connects the link '{name}'", f"links.{name}", "join it to another link or remove it")
 
 
 def _hints(mechanism: Varying) -> Iterator[Finding]:

@@ -30,7 +30,6 @@ from trunnion.model.joint_parts import (
     has_play,
     play,
 )
-from trunnion.model.merge import stated
 from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.quantity import nominal_dimensions
@@ -108,7 +107,10 @@ USES: Mapping[str, tuple[Callable[[_Case], bool], str]] = {
     "seat.beta": (lambda case: case.upright, "does not tilt, or has its seat stated by a direction"),
     "seat.xi": (lambda case: not case.pair.ball, "has its seat stated by a direction"),
     "seat.direction": (lambda case: case.pair.ball, "has its seat stated by angles, xi and beta"),
-    "seat_on": (lambda case: case.joint.type in TURNING_PAIRS, "needs none: its length moves with one link"),
+    "seat_on": (
+        lambda case: case.joint.type in TURNING_PAIRS and not isinstance(case.joint.seat, Seat),
+        "needs none: its length moves with one link, or its seat is stated",
+    ),
 }
 # and what is a remark, not a mistake
 REMARKS: Mapping[str, tuple[Callable[[_Case], bool], str]] = {
@@ -166,7 +168,6 @@ def _is_off(friction: Friction | None) -> bool:
 def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
     """Whether each joint has its links and points, and what its parts need."""
     yield from _vain(mechanism)
-    yield from _choices("joint_defaults", mechanism.joint_defaults)
     seat, spatial = mechanism.joint_defaults.seat, mechanism.space == "spatial"
     if seat not in (None, "free") and not any(has_play(joint) for joint in mechanism.effective_joints.values()):
         remedy = "state pin: {clearance: …}, hole_radius or a fit"
@@ -184,14 +185,9 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
             yield from _parameters_of_law(
                 joint.friction, "joint_defaults.friction" if stated_joint.friction is None else f"{where}.friction"
             )
-        yield from _choices(where, stated_joint)
-        yield from faults(
-            where,
-            (joint.seat_on is not None and joint.seat_on not in joint.links, "seat_on",
-             f"'{joint.seat_on}' is no link of this joint", f"name {' or '.join(joint.links)}"),
-            (stated_joint.seat_on is not None and isinstance(joint.seat, Seat), "seat_on",
-             "the seat is given, and seat_on is for a pin without a stated seat", "keep one of seat and seat_on"),
-        )  # fmt: skip
+        if joint.seat_on is not None and joint.seat_on not in joint.links:
+            remedy = f"name {' or '.join(joint.links)}"
+            yield Finding(f"'{joint.seat_on}' is no link of this joint", f"{where}.seat_on", remedy)
         if joint.contact is not None:
             yield from _in_play(mechanism, name, case)
         if isinstance(limits := _fit(mechanism, name), Finding):
@@ -240,8 +236,6 @@ def _lacks(case: _Case, where: str) -> Iterator[Finding]:
         (pair.threaded and joint.pitch is None, "", "a helical joint without a pitch",
          "add pitch: 5 mm, the slide of one turn, negative for a left-hand thread"),
         (no_radius and pin and pin.hole_radius is not None, "", "a hole radius without that of the pin"),
-        (joint.losses is not None and not stated(joint.losses), "", "losses without a number",
-         "state constant: …, viscous: … or both"),
         (seated and not has, "", "a seat without play", f"{clear}, or seat: free"),
         (seated and has and (spatial or pair.guided) and short, "", f"a seat without the length of the {part}",
          f"state {part}: {{length: …}}, or seat: free"),
@@ -273,24 +267,6 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
     for key, parameter in declared.items():
         if parameter.default is None and not parameter.optional and key not in friction.parameters:
             yield Finding(f"the friction law {law} needs '{key}'", where, parameter.meaning)
-
-
-def _choices(at: str, part: Joint | JointDefaults) -> Iterator[Finding]:
-    """Things of which a joint, or the defaults, may state one."""
-    pin, seat = stated(part.pin).keys(), stated(part.seat).keys() if isinstance(part.seat, Seat) else None
-    rest, contact = pin & {"radius", "hole_radius", "clearance"}, getattr(part, "contact", None)
-    yield from faults(
-        at,
-        ("fit" in pin and rest, "pin", "a fit states radius and clearance already"),
-        ("fit" not in pin and {"hole_radius", "clearance"} <= rest, "pin",
-         "the hole is stated by its radius and by the clearance"),
-        (seat is not None and not seat, "seat", "states no position",
-         "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}"),
-        (seat and "direction" in seat and len(seat) > 1, "seat",
-         "states a direction, of a ball, and angles, of a pin"),
-        (contact and contact.stiffness is not None and contact.modulus is not None, "contact",
-         "states both stiffness and modulus"),
-    )  # fmt: skip
 
 
 def _in_play(mechanism: Numbers, name: str, case: _Case) -> Iterator[Finding]:

@@ -21,9 +21,7 @@ PLACES = ("place-of-maximum", "place-of-minimum")
 def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
     """Whether a measure has one subject that exists, and is taken where and as it can be."""
     if len(measure.kinds) != 1:
-        what = f"measures {' and '.join(measure.kinds) or 'nothing'}"
-        yield Finding(what, where, f"state one of {', '.join(MEASURES)}")
-        return
+        return  # a finding of its own
     key, kind, name = measure.kind, MEASURES[measure.kind], measure.subject
     joint = mechanism.effective_joints.get(name)
     if key == "expression":
@@ -54,13 +52,12 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
          "add axis: x, y or z"),
         ((axis or along) and not word, "axis" if axis else "along",
          "the axis of a coordinate is stated, but no point and no reaction"),
-        (along and (axis or of_angle), "along", "has an axis and a direction", "an angle needs an axis"),
+        (along and of_angle, "along", "is a direction, and an angle needs an axis"),
         (measure.axis == "z" and mechanism.space == "planar", "axis", "there is no z in the plane"),
         # where and how it is taken
         (dwell and measure.within is None, "", "a dwell is within a band", "add within: [10 mm, 12 mm]"),
         (not dwell and measure.within is not None, "within", "a band is stated, but no dwell", "add as: dwell"),
         (measure.duration is not None and not kind.in_time, "duration", "a duration is of a motion in time"),
-        (at and over, "", "states both a position and a range"),
         ((at or over) and not mechanism.drivers, "at" if at else "over",
          "there is no driver whose coordinate it could be: the mechanism has one position"),
         (over and lasting, "over", f"the {key} is over all of it"),

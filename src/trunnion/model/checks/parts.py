@@ -97,26 +97,22 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
     for name, gear in mechanism.gears.items():
         where, (first, second) = f"gears.{name}", gear.joints
         sliding = [joint for joint in gear.joints if not has_pin(joints[joint].type)]
-        keys = [key for key in ("ratio", "radius", "lead") if getattr(gear, key) is not None]
-        states = f"{' and '.join(keys) or 'no ratio, radius or lead'} {'are' if len(keys) > 1 else 'is'} stated"
         shared, screw = {*joints[first].links} & {*joints[second].links}, gear.lead is not None
         wrong = [*faults(
             where,
             (mechanism.space == "spatial", "", "gear pairs are planar"),
             (name in joints, "", "a joint has this name too"),
             (len(sliding) == 2, "joints", "both joints slide", "name a revolute joint, or two"),
-            (len(sliding) == 1 and keys not in (["radius"], ["lead"]), "",
-             f"the joint '{'/'.join(sliding)}' slides, and {states}",
-             "state radius: … of the wheel (rack, chain, rope), or lead: … (screw), not both"),
-            (not sliding and keys != ["ratio"], "", f"both joints turn, and {states}", "state ratio: … alone"),
+            (len(sliding) == 1 and not gear.slides, "ratio", f"is stated, and the joint '{'/'.join(sliding)}' slides",
+             "state radius: … of the wheel (rack, chain, rope), or lead: … (screw)"),
+            (not sliding and gear.slides, "lead" if screw else "radius", "is stated, and both joints turn",
+             "state ratio: …"),
         )]  # fmt: skip
         yield from wrong
         if wrong:
             continue
         yield from faults(
             where,
-            *((screw and key in gear.model_fields_set, key, "has no effect: a screw has no pitch point")
-              for key in ("pressure_angle", "teeth")),
             (len(shared) == 2, "joints", "both joints are between the same two links"),
             (gear.touches and not shared, "",
              f"'{first}' and '{second}' have no link in common that carries both gears, or wheel and rack",
@@ -346,10 +342,6 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
     for name, spring in mechanism.springs.items():
         where, joint = f"springs.{name}", mechanism.effective_joints.get(spring.joint or "")
         ends = {end.partition(".")[0] for end in spring.between or ()}
-        if (spring.between is None) == (joint is None):
-            yield Finding("states neither or both of two points and a joint", where,
-                          "state between: [link.point, link.point] or joint: …")  # fmt: skip
-            continue
         turns = joint is not None and "rotation" in freedoms(joint.type)
         key, other = ("free_angle", "free_length") if turns else ("free_length", "free_angle")
         free, stiff = getattr(spring, key) is not None, spring.stiffness is not None
@@ -360,13 +352,8 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
              f"a {joint and joint.type} joint has no one axis for a spring to act about or along",
              f"put it in a {ONE_AXIS}, or between two points"),
             (getattr(spring, other) is not None, other, f"this spring has no {other}", f"state {key} instead"),
-            (not stiff and spring.damping is None and spring.preload is None, "", "this spring is empty",
-             "state a stiffness, a damping or a preload"),
             (stiff and not free, "", f"a stiffness without a {key}", f"add {key}: …; its force there is the preload"),
-            (free and not stiff, key, f"a {key} has no effect without a stiffness"),
             (spring.only and turns, "only", f"a spring in a joint that turns cannot only {spring.only}"),
-            (spring.only and not turns and not stiff, "",
-             f"a spring that can only {spring.only} needs a stiffness and a free_length, at which it begins to act"),
         )  # fmt: skip
 
 
@@ -392,45 +379,22 @@ def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
 
 
 def load_findings(mechanism: Numbers) -> Iterator[Finding]:
-    """Whether each load acts on a link or resists a joint, with what that needs."""
+    """Whether each load acts at a point of its link, or along a freedom of its joint."""
     spatial = mechanism.space == "spatial"
     for name, load in mechanism.loads.items():
         where, joint = f"loads.{name}", mechanism.effective_joints.get(load.joint or "")
-        acts = [key for key in ("at", "force", "moment") if getattr(load, key) is not None]
-        resists = [key for key in ("resisting_torque", "resisting_force") if getattr(load, key) is not None]
-        if (load.link is None) == (load.joint is None):
-            yield Finding(
-                "acts on neither or both of a link and a joint", where, "state link: … and at: …, or joint: …"
-            )
-        elif load.link is not None:
-            form, points = "[x, y, z]" if spatial else "one number", mechanism.points[load.link]
-            yield from faults(
-                where,
-                (resists, "", "a resisting load acts on a joint, not a link", "state joint: … instead of link: …"),
-                (load.only is not None, "only", "only is for a load that resists a joint"),
-                (not resists and load.force is None and load.moment is None, "", "this load is empty",
-                 "state a force or a moment"),
-                (load.force is not None and load.at is None, "", "the force has no point to act at",
-                 "add at: <a point of the link>"),
-                (load.moment is not None and isinstance(load.moment, tuple) != spatial, "moment",
-                 f"the moment of a {mechanism.space} model is {form}"),
-                (load.at is not None and load.at not in points, "at",
-                 f"the link '{load.link}' has no point '{load.at}'", nearest(load.at or "", points)),
-            )  # fmt: skip
-            if load.link == mechanism.fixed_link:
-                yield Finding("acts on the fixed link and has no effect", where, "", Severity.WARNING)
-        elif joint is not None:
-            freed = {"resisting_torque": "rotation", "resisting_force": "slide"}
-            one_axis = bool(motions(joint.type))
-            yield from faults(
-                where,
-                (load.frame != "global", "frame", "frame is for a load on a link"),
-                (acts, "", "at, force and moment are for a load on a link",
-                 "state resisting_torque or resisting_force"),
-                (not acts and not resists, "", "this load is empty", "state resisting_torque or resisting_force"),
-                (len(resists) == 2, "", "resists a rotation and a slide at once", "state a load for each"),
-                *((freed[key] not in motions(joint.type), key,
-                   f"a {joint.type} joint has no "
-                   f"{f'{freed[key]} to resist' if one_axis else 'one axis that it could act about or along'}",
-                   f"resist a {ONE_AXIS}, or state a force or moment on a link") for key in resists),
-            )  # fmt: skip
+        points, freed = mechanism.points.get(load.link or "", ()), motions(joint.type) if joint else ()
+        resists = {"resisting_torque": "rotation", "resisting_force": "slide"}
+        yield from faults(
+            where,
+            (load.moment is not None and isinstance(load.moment, tuple) != spatial, "moment",
+             f"the moment of a {mechanism.space} model is {'[x, y, z]' if spatial else 'one number'}"),
+            (load.at is not None and load.at not in points, "at",
+             f"the link '{load.link}' has no point '{load.at}'", nearest(load.at or "", points)),
+            *((getattr(load, key) is not None and freedom not in freed, key,
+               f"a {joint and joint.type} joint has no "
+               f"{f'{freedom} to resist' if freed else 'one axis that it could act about or along'}",
+               f"resist a {ONE_AXIS}, or state a force or moment on a link") for key, freedom in resists.items()),
+        )  # fmt: skip
+        if load.link is not None and load.link == mechanism.fixed_link:
+            yield Finding("acts on the fixed link and has no effect", where, "", Severity.WARNING)

@@ -17,7 +17,6 @@ from trunnion.model.rules import faults, limit_findings, stray
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Cost, Variation
 from trunnion.model.tolerances import (
     DEFAULTS,
-    FORMULA,
     FULL_TURN,
     Price,
     Tolerance,
@@ -32,7 +31,6 @@ __all__ = ["cost_values", "meant", "tolerance_names", "tolerance_values"]
 
 NUMBER = KINDS["number"].dimensions[0]
 ROUNDING = 1e-9  # of an eigenvalue, and of limits that touch zero
-WAYS = ("model", "process", "options")
 
 
 # ---- names ----------------------------------------------------------------------------------------------------
@@ -86,15 +84,6 @@ def tolerance_names(mechanism: Varying) -> Iterator[Finding]:
             yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
     for row, pair in enumerate(mechanism.correlations):
         yield from meant(mechanism, f"correlations.{row}", dict.fromkeys(pair.of))[1]
-    for name, cost in mechanism.costs.items():
-        ways = [key for key in WAYS if getattr(cost, key) is not None]
-        yield from faults(
-            f"costs.{name}",
-            (len(ways) != 1, "", f"states {' and '.join(ways) or 'no cost'}",
-             "state one of model: power with B and k, process: … or options: {…}"),
-            *((len(ways) == 1 and not cost.model and getattr(cost, key) is not None, key,
-               f"'{key}' has no effect on a choice") for key in (*FORMULA, "unit", "least", "most")),
-        )  # fmt: skip
 
 
 def _shape(mechanism: Varying, variation: Any, where: str) -> Iterator[Finding]:

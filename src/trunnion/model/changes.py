@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.joint_parts import Friction
 from trunnion.model.parameters import Location
-from trunnion.model.quantity import Quantity
+from trunnion.model.quantity import AnyQuantity, Quantity
 
-__all__ = [
-    "assign",
-    "part_types",
-    "stated_at",
-    "with_law",
-]
+__all__ = ["assign", "fields_at", "stated_at", "with_law"]
 
 
 def assign(
@@ -57,23 +53,28 @@ def with_law(data: dict[str, Any], law: str) -> dict[str, Any]:
     declared = {} if law == "off" else FRICTION_LAWS[law].parameters
     holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
     for holder in (entry for entry in holders if "friction" in entry):
-        parameters_of_law = _kept(holder.pop("friction"), declared)
+        friction = holder.pop("friction")
+        if not isinstance(friction, Mapping):
+            friction = {} if friction is None else {"coefficient": friction}
         if law != "off":
-            holder["friction"] = {"law": law, **parameters_of_law}
+            shared = {key: value for key, value in friction.items() if key in ("model", *declared)}
+            holder["friction"] = {"law": law, **shared}
     return data
 
 
-def _kept(friction: Any, declared: Collection[str]) -> dict[str, Any]:
-    """What a statement of friction, short or long, keeps where the parameters of the law are others."""
-    if friction is None:
-        return {}
-    parameters = friction if isinstance(friction, Mapping) else {"coefficient": friction}
-    return {key: value for key, value in parameters.items() if key in ("model", *declared)}
+def fields_at(annotation: Any, location: Location) -> dict[str, Any]:
+    """The annotations of the keys that an entry may state, by key; empty where no entry can stand.
 
-
-def part_types(annotation: object) -> Iterator[type[BaseModel]]:
-    """The kinds of entries that a field may be."""
+    annotation: of what holds it, at its top the class of the model; location: of the entry in that.
+    """
+    origin, arguments = get_origin(annotation), get_args(annotation)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for form in get_args(annotation):
-        yield from part_types(form)
+        fields = {field.alias or name: field.annotation for name, field in annotation.model_fields.items()}
+        if annotation is Friction:
+            fields |= {key: AnyQuantity for law in FRICTION_LAWS.values() for key in law.parameters}
+        if location and location[0] not in fields:
+            return {}
+        return fields_at(fields[str(location[0])], location[1:]) if location else fields
+    if origin in (Mapping, tuple):  # the next is the name of an entry, or its place in a list
+        return fields_at(arguments[0 if origin is tuple else 1], location[1:])
+    return {key: below for form in arguments for key, below in fields_at(form, location).items()}

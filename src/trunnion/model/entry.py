@@ -130,9 +130,7 @@ class Part(BaseModel):
             _refuse()
         super().__setattr__(name, value)
 
-    def __delattr__(self, name: str) -> None:
-        """Nothing."""
-        _refuse()
+    __delattr__ = _refuse
 
     def __dir__(self) -> list[str]:
         """Its own names; those of pydantic work, and show the way to nothing."""

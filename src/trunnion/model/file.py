@@ -157,8 +157,14 @@ def _file_type(path: Path) -> str:
 def entries_of(text: str, kind: str = "YAML") -> tuple[dict[str, Any], Lines]:
     """Plain data of a text in YAML, JSON or TOML, and the line of every path in it; MechanismError if it is none."""
     try:
-        if kind == "TOML":
-            return _parse_toml(text), {}  # tomllib keeps no lines
+        if kind == "TOML":  # tomllib keeps no lines, and takes a time with the square of the dots in a key
+            deep = _DEEP_KEY.search(text)
+            data = {} if deep else tomllib.loads(text)
+            if deep or _depth(data) > MAX_DEPTH:
+                line = text.count("\n", 0, deep.start()) + 1 if deep else None
+                remedy = "check brackets and the dots in keys"
+                raise MechanismError(Finding("is nested too deeply", remedy=remedy, line=line))
+            return data, {}
         root = composed(text.replace("\t", " ") if kind == "JSON" else text)  # a tab is allowed in JSON, not in YAML
     except MechanismError:
         raise
@@ -181,15 +187,6 @@ def entries_of(text: str, kind: str = "YAML") -> tuple[dict[str, Any], Lines]:
     if builder.findings:
         raise MechanismError(builder.findings)
     return data, builder.lines
-
-
-def _parse_toml(text: str) -> dict[str, Any]:
-    deep = _DEEP_KEY.search(text)  # tomllib takes a time with the square of the dots
-    data = {} if deep else tomllib.loads(text)
-    if deep or _depth(data) > MAX_DEPTH:
-        line = text.count("\n", 0, deep.start()) + 1 if deep else None
-        raise MechanismError(Finding("is nested too deeply", remedy="check brackets and the dots in keys", line=line))
-    return data
 
 
 def _depth(data: Any) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import typing
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from trunnion.errors import Finding
-from trunnion.model.changes import part_types
+from trunnion.model.changes import fields_at
 from trunnion.model.entry import FORMS
 from trunnion.model.names import nearest
 from trunnion.model.parameters import item_name
@@ -48,7 +47,7 @@ _INSTEAD = {  # what to write in place of a word that is none of the known, by k
 
 
 def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any]) -> Finding:
-    location = _plain(error["loc"])
+    location = tuple(part for part in error["loc"] if part not in ("[key]", *FORMS))  # without the marks of pydantic
     key = str(location[-1]) if location else ""
     context = error.get("ctx", {})
     kind = error["type"]
@@ -60,7 +59,7 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     elif kind in ("quantity", "stated"):
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":
-        what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
+        what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, fields_at(model, location[:-1]))
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
         what = f"'{error['input'][:40]}' is not the name of an assembly mode"
         remedy = "write way-1, way-2, … as `check` lists them, or folds"
@@ -81,11 +80,6 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     return Finding(what, _path(location, data), remedy)
 
 
-def _plain(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """A location without the marks of pydantic: tags of forms and of keys."""
-    return tuple(part for part in location if part not in ("[key]", *FORMS))
-
-
 def _path(location: tuple[int | str, ...], data: Mapping[str, Any]) -> str:
     """Location as a path: coordinates by their letters, rows of the loop by their joints."""
     parts: list[str] = []
@@ -100,21 +94,3 @@ def _path(location: tuple[int | str, ...], data: Mapping[str, Any]) -> str:
         else:
             parts.append(item_name(location[:place], part))
     return ".".join(parts)
-
-
-def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """The keys that the part of the model at a location can have."""
-    reached, named = [model], False
-    for key in location:
-        fields = [
-            candidate
-            for kind in reached
-            for name, candidate in kind.model_fields.items()
-            if (candidate.alias or name) == key
-        ]
-        if named or not fields:  # the name of an entry, or its place in a list
-            named = False
-            continue
-        reached = [part for field in fields for part in part_types(field.annotation)]
-        named = any(typing.get_origin(field.annotation) in (Mapping, tuple) for field in fields)
-    return [field.alias or name for kind in reached for name, field in kind.model_fields.items()]

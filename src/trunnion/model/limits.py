@@ -43,40 +43,30 @@ class Limits:
         if isinstance(source, Limits):
             return source
         try:
-            if isinstance(source, str):
-                return cls(source, *_from_text(source))
-            upper = Quantity.read(source)
+            if not isinstance(source, str):
+                upper = Quantity.read(source)
+                if (number := float(upper.source)) < 0:
+                    what = f"a limit to either side has no sign, {number:g} has"
+                    raise UnitError(what, "write 1e-5, or +2e-5/-1e-5")
+                return cls(upper.source, Quantity.read(-number), upper)
+            text = normalise(source).strip()
+            if match := _BOTH.match(text):
+                terms = [term(part) for part in match.groups()]
+                unit = next((limit for _, limit in reversed(terms) if limit), "")
+                signed = [Quantity.read(f"{number} {unit_own or unit}".strip()) for number, unit_own in terms]
+                lower, upper = sorted(signed, key=lambda limit: float(limit.evaluate()))
+            else:
+                text = _EITHER.sub(r"\1", text)
+                if text[:1] in ("+", "-"):
+                    what = f"the limits '{source[:60]}' have a sign on one side only"
+                    raise UnitError(what, f"{_FORMS}, of one side +0.02/0 mm")
+                upper = Quantity.read(text)
+                if upper.tolerance:
+                    raise UnitError(f"the limits '{source[:60]}' have a tolerance of their own", _FORMS)
+                lower = Quantity.read(f"-({text})")
         except UnitError as error:
             raise problem(error.what, error.remedy or _FORMS) from error
-        number = float(upper.source)
-        if number < 0:
-            raise problem(f"a limit to either side has no sign, {number:g} has", "write 1e-5, or +2e-5/-1e-5")
-        return cls(upper.source, Quantity.read(-number), upper)
-
-
-def _from_text(source: str) -> tuple[Quantity, Quantity]:
-    text = normalise(source).strip()
-    if match := _EITHER.match(text):
-        return _either(match[1], source)
-    if match := _BOTH.match(text):
-        terms = [term(part) for part in match.groups()]
-        unit = next((limit for _, limit in reversed(terms) if limit), "")
-        signed = [Quantity.read(f"{number} {unit_own or unit}".strip()) for number, unit_own in terms]
-        sizes = [float(limit.evaluate()) for limit in signed]
-        order = np.argsort(sizes, kind="stable")
-        lower, upper = (replace(signed[place], source=source) for place in order)
-        return lower, upper
-    return _either(text, source)
-
-
-def _either(text: str, source: str) -> tuple[Quantity, Quantity]:
-    """The same to either side."""
-    if text[:1] in ("+", "-"):
-        raise problem(f"the limits '{source[:60]}' have a sign on one side only", f"{_FORMS}, of one side +0.02/0 mm")
-    upper = Quantity.read(text)
-    if upper.tolerance:
-        raise problem(f"the limits '{source[:60]}' have a tolerance of their own", _FORMS)
-    return replace(Quantity.read(f"-({text})"), source=source), replace(upper, source=source)
+        return cls(source, replace(lower, source=source), replace(upper, source=source))
 
 
 LimitText = Annotated[

@@ -13,6 +13,7 @@ from trunnion.model.joint_parts import freedoms
 from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity, evaluation_order
+from trunnion.model.rules import faults
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
 __all__ = [
@@ -34,11 +35,9 @@ def dimension_kinds(mechanism: Fields) -> dict[str, Kind]:
 
 def _of_dimension(dimension: Dimension | None) -> Kind:
     """The usual kind of a dimension, a number where none is known."""
-    usual = {kind.dimensions[0]: kind for kind in KINDS.values()}
-    dimension_own = dimension or NUMBER
-    return usual.get(dimension_own) or Kind(
-        "quantity", si_unit(dimension_own), f"1 {si_unit(dimension_own)}", (dimension_own,)
-    )
+    dimension = dimension or NUMBER
+    usual, si = {kind.dimensions[0]: kind for kind in KINDS.values()}, si_unit(dimension)
+    return usual.get(dimension) or Kind("quantity", si, f"1 {si}", (dimension,))
 
 
 def drive_kind(mechanism: Fields) -> Kind:
@@ -143,13 +142,18 @@ def expression_findings(mechanism: Fields, measure: Measure, where: str) -> Iter
     try:
         formula, parts = parse(text), operands(mechanism, measure)
         wrong = [*_wrong_operands(mechanism, parts, where)]
-        if not wrong and _circular(mechanism, measure):
-            wrong = [Finding(f"'{text}' depends on itself", where, "remove the circle")]
-        if not wrong and not any(parts.values()):
-            what, remedy = f"'{text}' has no measure in it: it never changes", "name one, or a joint's rotation"
-            wrong = [Finding(what, where, remedy)]
+        reached: list[Measure] = []
+        for part in (left := [] if wrong else [measure]):  # it grows by what each depends on
+            others = [other for other in operands(mechanism, part).values() if other is not None]
+            left += [other for other in others if other not in reached]
+            reached += left[len(reached) + 1 :]
         yield from wrong
-        if not wrong:
+        if measure in reached:
+            yield Finding(f"'{text}' depends on itself", where, "remove the circle")
+        elif not wrong and not any(parts.values()):
+            what, remedy = f"'{text}' has no measure in it: it never changes", "name one, or a joint's rotation"
+            yield Finding(what, where, remedy)
+        elif not wrong:
             formula.dimension(_dimensions(mechanism, measure))
     except UnitError as error:
         yield Finding(error.what, where, error.remedy)
@@ -159,32 +163,21 @@ def _wrong_operands(mechanism: Fields, parts: Mapping[str, Measure | None], wher
     """What is wrong with the names in an expression."""
     columns = "name a measure, a dimension, JOINT.rotation, JOINT.slide, DRIVER.effort or LINK.POINT.x"
     for name, part in parts.items():
-        dimension, noun = name in mechanism.dimensions, str(MEASURES[part.kind].of) if part and part.kind else ""
-        if part is None and not dimension:
+        dimension = name in mechanism.dimensions
+        if part is None or dimension:
             near = columns if "." in name else nearest(name, [*mechanism.measures, *mechanism.dimensions])
-            yield Finding(f"there is no measure or dimension '{name}'", where, near)
-        elif part is not None and dimension:
-            yield Finding(f"'{name}' is a measure and a dimension", where, "give one of them another name")
-        elif part is not None and name not in mechanism.measures and part.subject not in mechanism.named(noun):
-            yield Finding(f"there is no {noun} '{part.subject}'", where, columns)
-        elif part is not None and not _runs(part):
+            yield from faults(
+                "",
+                (part is not None, where, f"'{name}' is a measure and a dimension", "give one of them another name"),
+                (not dimension, where, f"there is no measure or dimension '{name}'", near),
+            )
+            continue
+        kind = MEASURES.get(part.kind)
+        if kind and name not in mechanism.measures and part.subject not in mechanism.named(str(kind.of)):
+            yield Finding(f"there is no {kind.of} '{part.subject}'", where, columns)
+            continue
+        figure = part.at is not None or part.over is not None or part.statistic or part.reduced
+        deviates = kind and (kind.against or (part.kind == "angle" and part.axis is not None))
+        if not kind or figure or deviates or kind.in_time or kind.rule not in ("deviation", "ratio"):
             what = f"the measure '{name}' is no number at every position of one mechanism"
             yield Finding(what, where, "name measures without place, range and statistic, that are no deviation")
-
-
-def _runs(part: Measure) -> bool:
-    """Whether a measure is a number at every position of one mechanism: no figure, and no deviation from nominal."""
-    if not part.kind or part.at is not None or part.over is not None or part.statistic or part.reduced:
-        return False
-    kind = MEASURES[part.kind]
-    deviates = kind.against or (part.kind == "angle" and part.axis is not None)
-    return not kind.in_time and kind.rule in ("deviation", "ratio") and not deviates
-
-
-def _circular(mechanism: Fields, measure: Measure) -> bool:
-    """Whether an expression depends on itself, directly or through others."""
-    reached: list[Measure] = []
-    for part in (left := [measure]):  # it grows
-        left += [other for other in operands(mechanism, part).values() if other is not None and other not in reached]
-        reached += left[len(reached) + 1 :]
-    return measure in reached

@@ -22,7 +22,7 @@ from trunnion.model.checks.check import check_model
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.findings import schema_findings
-from trunnion.model.joint_parts import Joint, Seat, has_play, play
+from trunnion.model.joint_parts import Seat, has_play, play
 from trunnion.model.names import nearest
 from trunnion.model.places import place_of
 from trunnion.model.tolerances import Varying
@@ -112,19 +112,16 @@ class Mechanism(Varying):
 
     @cached_property
     def seated(self) -> Mapping[str, Literal["loaded"] | Seat]:
-        """How the pin lies in its hole, of every joint that has a play and a seat other than free."""
+        """How the pin lies in its hole, of every joint that has a play above 0 and a seat other than free."""
+        numbers = self.parameter_set.nominal
         return ReadOnlyDict(
             {
                 name: joint.seat
                 for name, joint in self.effective_joints.items()
-                if joint.seat is not None and joint.seat != "free" and has_play(joint) and self._moves(name, joint)
+                if joint.seat is not None and joint.seat != "free" and has_play(joint)
+                and (play(joint, name, numbers) > 0 or numbers.get(f"joints.{name}.pin.end_float", 0.0) > 0)
             }
-        )
-
-    def _moves(self, name: str, joint: Joint) -> bool:
-        """Whether a play is more than 0, across the axis or along it."""
-        numbers = self.parameter_set.nominal
-        return bool(play(joint, name, numbers) > 0 or numbers.get(f"joints.{name}.pin.end_float", 0.0) > 0)
+        )  # fmt: skip
 
     @cached_property
     def has_errors(self) -> bool:
@@ -235,9 +232,7 @@ class Mechanism(Varying):
         parts = f"{len(self.effective_links)} links, {len(self.effective_joints)} joints"
         return f"<Mechanism {self.name!r}, {self.space}: {parts}, {len(self.drivers)} drivers>"
 
-    def __str__(self) -> str:
-        """The same line: `print` shows no thousands of characters."""
-        return repr(self)
+    __str__ = __repr__  # `print` shows no thousands of characters
 
     def _repr_html_(self) -> str:
         """What a notebook shows: drawing, structural formula, mobility, findings. Never raises."""

@@ -60,9 +60,9 @@ def merge_joint(
     friction = _friction(stated(defaults.friction) if rubs else {}, stated(joint.friction))
     touching = joint.contact and joint.contact.complete()
     merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction, "contact": touching})
-    merged = merged.model_copy(
-        update={"misalignment": _misalignment(joint, spatial), "seat": _seat(merged, defaults.seat)}
-    )
+    bored = PAIRS[joint.type].bored  # its numbers can be set; what another joint states is for a finding
+    misalignment = (joint.misalignment or Misalignment()).complete(spatial) if bored else joint.misalignment
+    merged = merged.model_copy(update={"misalignment": misalignment, "seat": _seat(merged, defaults.seat)})
     stated_of_law = friction.parameters if friction else {}
     if stated_of_law.get("coefficient") == NO_FRICTION and stated_of_law.get("backward") in (None, NO_FRICTION):
         touches = has_pin(joint.type) or has_guide(joint.type)
@@ -118,13 +118,6 @@ def _half(size: Quantity, deviation: float, tolerance: tuple[float, float] | Non
     else:
         half = Quantity.read(size.source / 2 + deviation, size.kind)
     return replace(half, tolerance=tolerance)
-
-
-def _misalignment(joint: Joint, spatial: bool) -> Misalignment | None:
-    """Complete where a joint can have one, so that its numbers can be set; as stated, for a finding, where not."""
-    if not PAIRS[joint.type].bored:
-        return joint.misalignment
-    return (joint.misalignment or Misalignment()).complete(spatial)
 
 
 def _seat(joint: Joint, default: SeatChoice | None) -> SeatChoice:

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import cached_property
 
 from trunnion.errors import Finding, MechanismError
 
@@ -67,7 +68,6 @@ class ParameterNames:
         self.all = dict.fromkeys(paths)
         # a deviation is named by what it shifts: its own endings would only make those of the numbers ambiguous
         self.paths = [path for path in self.all if not path.startswith(ERRORS)]
-        self._endings: dict[str, list[str]] | None = None
 
     def resolve(self, name: str) -> str:
         """The path that a name means; MechanismError names the nearest if there is none or several."""
@@ -78,8 +78,12 @@ class ParameterNames:
         paths = self.endings.get(name, [])
         if len(paths) == 1:
             return paths[0]
-        if not paths and name.startswith(ERRORS):
-            return self._error(name)
+        if not paths and name.startswith(ERRORS):  # the deviation of a number, by a name of that number
+            path = self.resolve(name.removeprefix(ERRORS))
+            if f"{ERRORS}{path}" in self.all:
+                return f"{ERRORS}{path}"
+            remedy = f"state it in the file: errors: {{{as_key(path)}: …}}"
+            raise MechanismError(Finding(f"the model states no error of '{path}'", remedy=remedy))
         below = [path for path in self.paths if f".{name}." in f".{path}."]
         short = [path for path in below if path.endswith(f"{name}.{SHORT_FORM}")]
         if len(short) == 1 and name.endswith("friction"):  # `friction: 0.1` in a file is the coefficient, so here too
@@ -97,21 +101,12 @@ class ParameterNames:
             remedy = near if (near := nearest(name, longer)).startswith("did you mean") else remedy
         raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 
-    def _error(self, name: str) -> str:
-        """The path of the deviation of a number by a name of that number."""
-        path = self.resolve(name.removeprefix(ERRORS))
-        if f"{ERRORS}{path}" not in self.all:
-            what = f"the model states no error of '{path}'"
-            raise MechanismError(Finding(what, remedy=f"state it in the file: errors: {{{as_key(path)}: …}}"))
-        return f"{ERRORS}{path}"
-
-    @property
+    @cached_property
     def endings(self) -> dict[str, list[str]]:
         """Paths by every ending they have."""
-        if self._endings is None:
-            self._endings = {}
-            for path in self.paths:
-                parts = path.split(".")
-                for start in range(1, len(parts)):
-                    self._endings.setdefault(".".join(parts[start:]), []).append(path)
-        return self._endings
+        endings: dict[str, list[str]] = {}
+        for path in self.paths:
+            parts = path.split(".")
+            for start in range(1, len(parts)):
+                endings.setdefault(".".join(parts[start:]), []).append(path)
+        return endings

@@ -6,6 +6,7 @@ then cheap, and arrays (sample, 1) or dual numbers flow through the expressions 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -227,8 +228,14 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
                 entry = replace(entry, kind=entry.kind.of("rotation" in freedoms(joint.type)))
-            elif isinstance(part, Contact) and entry.location[-1] == "stiffness":
-                entry = replace(entry, kind=_contact_stiffness(part))
+            elif isinstance(part, Contact) and entry.location[-1] == "stiffness":  # K of F = K dⁿ
+                kind = ANY  # where the exponent depends on dimensions
+                if part.exponent is not None and not part.exponent.names:
+                    power = Fraction(str(part.exponent.evaluate())).limit_denominator(1000)
+                    text = f"N/m^{float(power):g}" if power != 1 else "N/m"
+                    dimension = (1 - power, Fraction(1), Fraction(-2), Fraction(0))
+                    kind = Kind("contact stiffness", text, f"60e9 {text}", (dimension,))
+                entry = replace(entry, kind=kind)
             follows = shared.get(entry.path) is entry.quantity
             yield replace(entry, alias=f"joint_defaults.{entry.path.removeprefix(f'{path}.')}") if follows else entry
     pin, misalignment = joint.pin, joint.misalignment
@@ -239,16 +246,6 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     if pin and pin.length and not pin.bearing:
         length, where = pin.length, (*location, "pin", "bearing")
         yield Entry(f"{path}.pin.bearing", where, length, length.kind, f"{path}.pin.length")
-
-
-def _contact_stiffness(contact: Contact) -> Kind:
-    """What K of F = K dⁿ measures, by the exponent n; any quantity where that depends on dimensions."""
-    exponent = contact.exponent
-    if exponent is None or exponent.names:
-        return ANY
-    power = Fraction(str(exponent.evaluate())).limit_denominator(1000)
-    text = f"N/m^{float(power):g}" if power != 1 else "N/m"
-    return Kind("contact stiffness", text, f"60e9 {text}", ((1 - power, Fraction(1), Fraction(-2), Fraction(0)),))
 
 
 def _of_law(friction: Friction, entry: Entry) -> Entry:
@@ -297,7 +294,9 @@ class ParameterSet:
         self.names = ParameterNames(self.entries)
         numbers = [entry for entry in self.entries.values() if not entry.varies]
         self._dependent = [entry for entry in numbers if entry.depends]
-        self._ideal = {entry.path: 0.0 for entry in numbers if _is_error(entry.path)}
+        misaligned = re.compile(r"joints\..*\.misalignment\.(tilt|offset)")
+        self._ideal = {entry.path: 0.0 for entry in numbers
+                       if entry.path.startswith(ERRORS) or misaligned.fullmatch(entry.path)}  # fmt: skip
         self.nominal: dict[str, Number] = {}
         self._nominal_names: dict[str, Number] = {}
         for entry in numbers:
@@ -366,13 +365,6 @@ def _put(path: str, value: Number, values: dict[str, Number], names: dict[str, N
     section, _, name = path.partition(".")
     if section == "dimensions":
         names[name] = value
-
-
-def _is_error(path: str) -> bool:
-    """Whether a number is an error of the mechanism as built: a deviation, or how an axis lies off."""
-    section, _, rest = path.partition(".")
-    misaligned = section == "joints" and rest.endswith((".misalignment.tilt", ".misalignment.offset"))
-    return misaligned or path.startswith(ERRORS)
 
 
 class Numbers(Fields):

@@ -6,19 +6,17 @@ sections' classes declare.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.changes import part_types, stated_at
-from trunnion.model.joint_parts import Friction
+from trunnion.model.changes import fields_at, stated_at
 from trunnion.model.names import nearest
 from trunnion.model.parameters import Location, item_name
-from trunnion.model.quantity import AnyQuantity, Quantity
+from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import Cost, Variation
 from trunnion.model.tolerances import Varying
 
@@ -72,43 +70,31 @@ def _of_number(mechanism: Varying, section: str, rest: str) -> tuple[str, Locati
 
 def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
     """Paths and places of keys that entries of the file may state by a name: `B.pin.clearance`, `A.motor.limit` …"""
-    first, *keys = name.split(".")
-    if not keys and isinstance(getattr(mechanism, first, None), str):  # fits, over_constraint
-        yield "", (first,)
+    keys = tuple(name.split("."))
     sections = {key: getattr(mechanism, key) for key in type(mechanism).model_fields}
-    holders: list[tuple[Location, BaseModel, tuple[str, ...]]] = []
-    if isinstance(sections.get(first), BaseModel):
-        holders.append(((first,), sections[first], tuple(keys)))
-    for section, entries in {**sections, "joints": mechanism.stated_joints}.items():
-        owner, *inner = keys if first == section and keys else [first, *keys]
-        if isinstance(entries, Mapping) and isinstance(entries.get(owner), BaseModel):
-            holders.append(((section, owner), entries[owner], tuple(inner)))
+    sections["joints"] = mechanism.stated_joints
+    named = [(section, *keys) for section, entries in sections.items()
+             if isinstance(entries, Mapping) and isinstance(entries.get(keys[0]), BaseModel)]  # fmt: skip
+    owner = sections.get(keys[0])
+    if isinstance(owner, Mapping) and keys[1:]:
+        owner = owner.get(keys[1])
+    if isinstance(owner, str | BaseModel):
+        named.insert(0, keys)
     rows, data = [row.joint for row in mechanism.loop], mechanism.data()
-    for location, part, below in holders:
-        looped = location[0] == "joints" and location[-1] in rows
-        place: Location = ("loop", rows.index(str(location[-1]))) if looped else location
-        path, annotation = ".".join(map(str, (*location, *below))), field_of(type(part), below)
-        group, short = stated_at(data, (*place, *below[:-1])), below[-2:-1] in (("friction",), ("seat",))
-        if annotation is None and below[-1:] and below[-1] in tuple("xyz"):  # of a direction, which is made if need be
-            index, annotation = "xyz".index(below[-1]), field_of(type(part), below[:-1])
-            of_axes = item_name((*place, *below[:-1]), index) == below[-1] and _is_number(annotation, in_rows=True)
+    for location in named:
+        *above, key = location
+        looped = location[0] == "joints" and location[1] in rows
+        place: Location = ("loop", rows.index(location[1]), *location[2:]) if looped else location
+        fields, group = fields_at(type(mechanism), above), stated_at(data, place[:-1])
+        if key not in fields and key in ("x", "y", "z"):  # of a direction, which is made if need be
+            annotation = fields_at(type(mechanism), above[:-1]).get(above[-1])
+            of_axes = item_name(place[:-1], "xyz".index(key)) == key and _is_number(annotation, in_rows=True)
             if of_axes and isinstance(group, list | None):
-                yield path, (*place, *below[:-1], index)
-        elif annotation is not None and (group is None or isinstance(group, dict) or short):
-            if Friction in part_types(annotation):  # a plain number is the coefficient
-                annotation, path, below = AnyQuantity, f"{path}.coefficient", (*below, "coefficient")
-            yield path if _is_number(annotation) else "", (*place, *below)
-
-
-def field_of(kind: type[BaseModel], keys: Sequence[str]) -> Any:
-    """The annotation of what entries of a kind state by keys, each below the one before; None if they have none."""
-    fields = {field.alias or name: field.annotation for name, field in kind.model_fields.items()}
-    if kind is Friction:
-        fields |= {key: AnyQuantity for law in FRICTION_LAWS.values() for key in law.parameters}
-    if not keys or keys[0] not in fields:
-        return None
-    below = (field_of(part, keys[1:]) for part in part_types(fields[keys[0]]))
-    return fields[keys[0]] if len(keys) == 1 else next((inner for inner in below if inner is not None), None)
+                yield ".".join(location), (*place[:-1], "xyz".index(key))
+        elif key in fields and (group is None or isinstance(group, dict) or above[-1:] in (["friction"], ["seat"])):
+            if key == "friction":  # a plain number is the coefficient
+                location, place = (*location, "coefficient"), (*place, "coefficient")
+            yield ".".join(location) if key == "friction" or _is_number(fields[key]) else "", place
 
 
 def _is_number(annotation: Any, in_rows: bool = False) -> bool:

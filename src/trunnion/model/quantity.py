@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -53,12 +53,16 @@ class Quantity:
                 return source
             source = source.source
         if isinstance(source, (bool, np.bool_)) or not isinstance(source, (int, float, str, np.number)):
-            what = "is empty" if source is None else f"is {_shape(source)}, not a number or text"
+            shapes = {bool: "a yes/no value", list: "a list", tuple: "a list", dict: "a group of entries"}
+            shape = shapes.get(type(source), f"a {type(source).__name__}")
+            what = "is empty" if source is None else f"is {shape}, not a number or text"
             raise UnitError(what, f"give a {kind.name} such as {kind.example}")
-        if not isinstance(source, str):
-            source = _plain(source)
-            return cls(source, kind)
-        return cls(source, kind, *_read_text(source, kind))
+        if isinstance(source, str):
+            return cls(source, kind, *_read_text(source, kind))
+        value = source.item() if isinstance(source, np.number) else source
+        if not abs(value) <= sys.float_info.max:  # nan, or an int beyond the floats
+            raise UnitError(f"{str(value)[:20]} is not a finite number", "give a finite number")
+        return cls(value, kind)
 
     def __repr__(self) -> str:
         return f"Quantity({self.source!r}, {self.kind.name})"
@@ -130,24 +134,6 @@ def _read_text(text: str, kind: Kind) -> tuple[tuple[float, float] | None, Expre
 
 def _needed(kind: Kind) -> str:
     return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
-
-
-def _shape(value: object) -> str:
-    """What a value of the wrong shape is, in the words of a model file."""
-    names = {bool: "a yes/no value", list: "a list", tuple: "a list", dict: "a group of entries"}
-    return names.get(type(value), f"a {type(value).__name__}")
-
-
-def _plain(number: Any) -> float:
-    """A finite int or float; UnitError if it is not finite."""
-    value = number.item() if isinstance(number, np.generic) else number
-    try:
-        finite = math.isfinite(value)
-    except OverflowError:  # an int beyond the floats
-        finite = False
-    if not finite:
-        raise UnitError(f"{str(value)[:20]} is not a finite number", "give a finite number")
-    return value  # type: ignore[no-any-return]
 
 
 def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:

@@ -21,46 +21,28 @@ def renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] =
         Its names.
     """
     if isinstance(group, dict):
-        named = _named(section, way)
-        return {
-            (new if named and key == old else key): renamed(one, section, old, new, (*way, key))
-            for key, one in group.items()
-        }
+        of_joints = way in (("drivers",), ("assembly",)) or (way[:1] == ("links",) and way[2:] == ("points",))
+        named = way == (section,) or (section == "joints" and of_joints)
+        return {(new if named and key == old else key): renamed(item, section, old, new, (*way, key))
+                for key, item in group.items()}  # fmt: skip
     if isinstance(group, list):
-        return [renamed(one, section, old, new, way) for one in group]
-    return _respoken(group, section, old, new, way) if isinstance(group, str) else group
-
-
-def _named(section: str, way: tuple[str, ...]) -> bool:
-    """Whether the keys of a group are names of the section."""
-    if way == (section,):
-        return True
-    of_joints = way in (("drivers",), ("assembly",)) or (len(way) == 3 and way[0] == "links" and way[2] == "points")
-    return section == "joints" and of_joints
-
-
-def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...]) -> str:
-    """A text that speaks of a name, with the new one."""
-    last = way[-1] if way else ""
+        return [renamed(item, section, old, new, way) for item in group]
+    if not isinstance(group, str) or not way:
+        return group
+    name, last = re.escape(old), way[-1]
     if section in ("loads", "springs", "gears"):
-        return (
-            new
-            if text == old and way[:1] == ("measures",)
-            else re.sub(rf"\b{section}\.{re.escape(old)}(?=\.)", f"{section}.{new}", text)
-        )
+        if group == old and way[0] == "measures":
+            return new
+        return re.sub(rf"\b{section}\.{name}(?=\.)", f"{section}.{new}", group)
+    if section in ("links", "joints") and last == "between":
+        return re.sub(rf"^{name}(?=\.)" if section == "links" else rf"(?<=\.){name}$", new, group)
     if section == "links":
-        if last == "between":
-            return re.sub(rf"^{re.escape(old)}(?=\.)", new, text)
-        return new if text == old and last in ("links", "link", "ground") else text
+        return new if group == old and last in ("links", "link", "ground") else group
     if section == "joints":
-        if last == "between":
-            return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
         spoken = last in ("frame", "joint", "joints") or (last == "at" and way[0] != "links")  # there it is a place
-        return new if text == old and spoken else text
-    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if _names_dimensions(way) else text
-
-
-def _names_dimensions(way: tuple[str, ...]) -> bool:
-    """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
-    names_part = way[-1] in ("links", "link", "joint", "joints", "frame", "between", "type")
-    return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")
+        return new if group == old and spoken else group
+    # dimensions: in what is neither for readers nor the name of a part
+    names_part = last in ("links", "link", "joint", "joints", "frame", "between", "type")
+    if way[0] in ("name", "notes", "references") or names_part or (last == "at" and way[0] != "links"):
+        return group
+    return re.sub(rf"(?<![\w.]){name}(?![\w.])", new, group)

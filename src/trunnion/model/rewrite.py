@@ -6,7 +6,7 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
-from io import StringIO
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,12 @@ from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.csv_table import OF_A_FILE, stated_files
-from trunnion.model.file import composed, entries_of, read_entries, text_of, yaml_writer
+from trunnion.model.file import composed, entries_of, read_entries, text_of
 from trunnion.model.mechanism import Mechanism, read_mechanism
 
 __all__ = ["changed_text", "rewrite_mechanism"]
 
-YAMLS = (".yaml", ".yml")
+YAMLS = {".yaml", ".yml"}
 Edit = tuple[int, int, str]  # from where to where a text is replaced, and by what
 
 
@@ -35,14 +35,14 @@ def rewrite_mechanism(
     source, path = Path(source), Path(path)
     if not over and path.exists() and path.samefile(source):
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
-    both_yaml = {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS)
-    same_folder = source.resolve().parent == path.resolve().parent
-    text = _edited_source(mechanism, source, same_folder) if both_yaml else None
+    text = _edited_source(mechanism, source, path) if {source.suffix.lower(), path.suffix.lower()} <= YAMLS else None
     with whole(path) as temporary:
         if text is not None:
             temporary.write_text(text, encoding="utf-8", newline="\n")
-        if text is None or not _holds(temporary, mechanism):  # a way of writing that was not foreseen
-            mechanism.write(temporary)
+            with suppress(MechanismError):
+                if read_mechanism(temporary) == mechanism:
+                    return
+        mechanism.write(temporary)  # a way of writing that was not foreseen
 
 
 def changed_text(text: str, after: Mapping[str, Any]) -> str:
@@ -58,34 +58,22 @@ def changed_text(text: str, after: Mapping[str, Any]) -> str:
         return text_of(after)
 
 
-def _holds(path: Path, mechanism: Mechanism) -> bool:
-    try:
-        return read_mechanism(path) == mechanism
-    except MechanismError:
-        return False
-
-
-def _edited_source(mechanism: Mechanism, source: Path, same_folder: bool) -> str | None:
+def _edited_source(mechanism: Mechanism, source: Path, path: Path) -> str | None:
     """The text of the source with what is different in the mechanism; None if it cannot be had.
 
-    same_folder: whether it is to stand in the folder of the source, where the files are that this names.
+    The source goes on to name its files of points, if these are the same and `path` is in its folder.
     """
     try:
-        text, before = source.read_text("utf-8"), read_mechanism(source).data()
-        _name_files(before, mechanism.data(), source, same_folder)
+        text, before, entries = source.read_text("utf-8"), read_mechanism(source).data(), read_entries(source)[0]
     except (MechanismError, OSError, ValueError):
         return None
-    return _edited(text, before, mechanism.data())
-
-
-def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, same_folder: bool) -> None:
-    """Let the data of the source name the files again whose points are to be written out: others, or elsewhere."""
-    entries = read_entries(source)[0]
+    after, same_folder = mechanism.data(), source.resolve().parent == path.resolve().parent
     for section, name, _ in stated_files(entries):
         entry = before[section][name]
         if not same_folder or after.get(section, {}).get(name, {}).get("points") != entry.get("points"):
             of_the_file = {key: value for key, value in entries[section][name].items() if key in OF_A_FILE}
             before[section][name] = {key: value for key, value in entry.items() if key != "points"} | of_the_file
+    return _edited(text, before, after)
 
 
 # ---- where the text changes -----------------------------------------------------------------------------------
@@ -133,7 +121,9 @@ def _edits(text: str, node: Any, before: Any, after: Any) -> Iterator[Edit]:
         return
     indent = "\n" + " " * node.start_mark.column
     inline = isinstance(node, ScalarNode) or node.flow_style or not isinstance(after, Mapping | list)
-    new = _flow(after, quoted=bool(getattr(node, "style", None))) if inline else indent.join(_block(after))
+    new = (
+        _flow(after, quoted=bool(getattr(node, "style", None))) if inline else indent.join(text_of(after).splitlines())
+    )
     yield node.start_mark.index, _last(node).end_mark.index, new
 
 
@@ -147,19 +137,21 @@ def _added(text: str, parent: MappingNode, key: Any, value: Any) -> Edit:
     end = text.find("\n", last.end_mark.index)
     end, column = len(text) if end < 0 else end, parent.start_mark.column
     if not column and isinstance(value, Mapping):
-        entry = "\n".join(
-            [f"{_scalar(key)}:", *(f"  {_scalar(name)}: {_flow(child)}" for name, child in value.items())]
-        )
+        lines = [f"  {_scalar(name)}: {_flow(child)}" for name, child in value.items()]
+        entry = "\n".join([f"{_scalar(key)}:", *lines])
     return end, end, f"\n{' ' * column}{entry}"
 
 
 def _removed(text: str, parent: MappingNode, place: int) -> Edit:
     """An entry taken out of a group that has others."""
     key, node = parent.value[place]
-    if parent.flow_style and place:
-        return parent.value[place - 1][1].end_mark.index, node.end_mark.index, ""
     if parent.flow_style:
-        return key.start_mark.index, parent.value[1][0].start_mark.index, ""
+        begin, end = (
+            (key.start_mark, parent.value[1][0].start_mark)
+            if place == 0
+            else (parent.value[place - 1][1].end_mark, node.end_mark)
+        )
+        return begin.index, end.index, ""
     end = text.find("\n", _last(node).end_mark.index) + 1
     return text.rfind("\n", 0, key.start_mark.index) + 1, end or len(text), ""
 
@@ -169,13 +161,6 @@ def _last(node: Any) -> Any:
     while not isinstance(node, ScalarNode) and not node.flow_style:
         node = node.value[-1][1] if isinstance(node, MappingNode) else node.value[-1]
     return node
-
-
-def _block(value: Any) -> list[str]:
-    """The lines of a value, the innermost groups on one each."""
-    stream = StringIO()
-    yaml_writer().dump(value, stream)
-    return stream.getvalue().splitlines()
 
 
 def _flow(value: Any, quoted: bool = False) -> str:

@@ -218,7 +218,10 @@ def check_values(
                 yield from joints.joint_values(mechanism, name, numbers)
             elif section == "drivers":
                 yield from parts.driver_values(mechanism, name, values)
-    yield from _unfollowed(numbers) if changed is None else ()
+    followed = {entry.alias for entry in numbers.entries.values()}
+    for path in numbers.entries if changed is None else ():
+        if path.startswith("joint_defaults.") and path not in followed:  # as a clearance of pins that all have a fit
+            yield Finding("has no effect: no joint follows it", path, "remove it", Severity.NOTE)
     yield from parts.gear_values(mechanism, values)
     if not sections.isdisjoint(("tables", "drivers")):
         yield from parts.table_values(mechanism, values)
@@ -241,14 +244,6 @@ def _alone(numbers: ParameterSet, path: str) -> Iterator[Finding]:
         yield Finding(what, entry.where, "check divisions and roots")
     if not entry.alias:
         yield from limit_findings(entry.rules, values[path], entry.kind, path)
-
-
-def _unfollowed(numbers: ParameterSet) -> Iterator[Finding]:
-    """Defaults without effect, as a clearance of pins that all have a fit."""
-    followed = {entry.alias for entry in numbers.entries.values()}
-    for path in numbers.entries:
-        if path.startswith("joint_defaults.") and path not in followed:
-            yield Finding("has no effect: no joint follows it", path, "remove it", Severity.NOTE)
 
 
 def _sides(mechanism: Varying, values: Values) -> Iterator[Finding]:

@@ -190,8 +190,15 @@ def cost_values(mechanism: Varying) -> Iterator[Finding]:
     groups: dict[str, dict[str, list[Price]]] = {}
     for name, cost in mechanism.costs.items():
         where, paths = f"costs.{name}", mechanism.cost_paths(name)
-        if not paths:
-            yield _unpriced(mechanism, name, where)
+        if not paths:  # neither a number with a tolerance nor a clearance
+            joint = mechanism.effective_joints.get(name.removeprefix("joints.").removesuffix(".clearance"))
+            what, remedy = f"no joint follows '{name}'", "name the number of a joint"
+            findings = [] if joint and name.endswith(".clearance") else meant(mechanism, "costs", [name])[1]
+            if joint and name.endswith(".clearance"):
+                derived = joint.pin is not None and (joint.pin.fit is not None or joint.pin.hole_radius is not None)
+                what = f"the joint of '{name}' states no clearance" + ": its play is that of its radii" * derived
+                remedy = "state clearance: 0.02 mm of its pin or guide"
+            yield from findings or [Finding(what, where, remedy)]
         for path in paths:
             if path in first:
                 yield Finding(f"'{name}' and '{first[path]}' are the same", where)
@@ -228,20 +235,6 @@ def _bought(mechanism: Varying, path: str, where: str, tolerance: Tolerance | No
     if tolerance is not None and not tolerance.can_be_chosen:
         what = f"'{path}' varies as measured or over a full turn: there is no tolerance to choose"
         yield Finding(what, where, "remove the cost", Severity.WARNING)
-
-
-def _unpriced(mechanism: Varying, name: str, where: str) -> Finding:
-    """Of a cost whose name is no number with a tolerance and no clearance."""
-    joint = mechanism.effective_joints.get(name.removeprefix("joints.").removesuffix(".clearance"))
-    if not name.endswith(".clearance") or joint is None:
-        _, findings = meant(mechanism, "costs", [name])
-        return next(iter(findings), Finding(f"no joint follows '{name}'", where, "name the number of a joint"))
-    if joint.pin is not None and (joint.pin.fit is not None or joint.pin.hole_radius is not None):
-        source = f"the fit {joint.pin.fit.source}" if joint.pin.fit is not None else "the radii of pin and hole"
-        what = f"'{name}' cannot have a cost: its play is derived from {source}"
-        return Finding(what, where, "state pin.clearance instead, or remove the cost: the play stays as stated")
-    what = f"the joint of '{name}' states no clearance"
-    return Finding(what, where, "state pin: {clearance: 0.02 mm}, or of a guide guide: {clearance: 0.02 mm}")
 
 
 def _offered(cost: Cost, where: str, kind: Kind | None, path: str) -> Iterator[Finding]:

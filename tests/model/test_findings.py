@@ -195,7 +195,7 @@ MISTAKES = {
             ("{angle: rocker, rotation: D}", "measures.error", "angle and rotation"),
             ("{path_error: rocker.X}", "error.path_error", "no point 'rocker.X'"),
             ("{stroke: D, axis: x}", "measures.error.axis", "axis of a coord"),
-            ("{stroke: D, at: 1 deg}", "measures.error.at", "of a range"),
+            ("{stroke: D, at: 1 deg}", "measures.error.at", "one number of a range"),
             ("{stroke: D, as: rms}", "measures.error.as", "one number of a range"),
             ("{efficiency: cycle, over: [0 deg, 9 deg]}", "error.over", "all of it"),
             ("{angle: rocker, as: value}", "measures.error.as", "a position"),

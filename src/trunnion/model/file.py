@@ -161,9 +161,9 @@ def entries_of(text: str, kind: str = "YAML") -> tuple[dict[str, Any], Lines]:
             deep = _DEEP_KEY.search(text)
             data = {} if deep else tomllib.loads(text)
             if deep or _depth(data) > MAX_DEPTH:
-                line = text.count("\n", 0, deep.start()) + 1 if deep else None
+                at = text.count("\n", 0, deep.start()) + 1 if deep else None
                 remedy = "check brackets and the dots in keys"
-                raise MechanismError(Finding("is nested too deeply", remedy=remedy, line=line))
+                raise MechanismError(Finding("is nested too deeply", remedy=remedy, line=at))
             return data, {}
         root = composed(text.replace("\t", " ") if kind == "JSON" else text)  # a tab is allowed in JSON, not in YAML
     except MechanismError:

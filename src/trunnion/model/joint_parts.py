@@ -357,17 +357,13 @@ def contact_lacks(joint: Joint, spatial: bool) -> tuple[str, ...]:
 
 def has_play(joint: Joint) -> bool:
     """Whether a joint is of a type whose play is modelled and states one, be it 0."""
+    pin, guide = joint.pin, joint.guide
     if joint.type not in PLAY_PAIRS:
         return False
     if has_guide(joint.type):
-        return joint.guide is not None and joint.guide.clearance is not None
-    pin = joint.pin
-    if pin is None:
-        return False
-    return (
-        pin.clearance is not None
-        or pin.end_float is not None
-        or (pin.radius is not None and pin.hole_radius is not None)
+        return guide is not None and guide.clearance is not None
+    return pin is not None and (
+        pin.clearance is not None or pin.end_float is not None or bool(pin.radius and pin.hole_radius)
     )
 
 

@@ -82,7 +82,7 @@ def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
         named.insert(0, keys)
     rows, data = [row.joint for row in mechanism.loop], mechanism.data()
     for location in named:
-        *above, key = location
+        above, key = location[:-1], location[-1]
         looped = location[0] == "joints" and location[1] in rows
         place: Location = ("loop", rows.index(location[1]), *location[2:]) if looped else location
         fields, group = fields_at(type(mechanism), above), stated_at(data, place[:-1])
@@ -91,7 +91,7 @@ def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
             of_axes = item_name(place[:-1], "xyz".index(key)) == key and _is_number(annotation, in_rows=True)
             if of_axes and isinstance(group, list | None):
                 yield ".".join(location), (*place[:-1], "xyz".index(key))
-        elif key in fields and (group is None or isinstance(group, dict) or above[-1:] in (["friction"], ["seat"])):
+        elif key in fields and (group is None or isinstance(group, dict) or above[-1:] in (("friction",), ("seat",))):
             if key == "friction":  # a plain number is the coefficient
                 location, place = (*location, "coefficient"), (*place, "coefficient")
             yield ".".join(location) if key == "friction" or _is_number(fields[key]) else "", place

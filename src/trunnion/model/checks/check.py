@@ -297,20 +297,17 @@ def _mass(mechanism: Varying, link: Link, values: Values, where: str) -> Iterato
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if about_origin:
             tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        if np.isfinite(tensor).all():
-            yield from _triangle(tensor, path)
-
-
-def _triangle(tensor: np.ndarray[tuple[int, ...], np.dtype[np.float64]], path: str) -> Iterator[Finding]:
-    """Whether a body can have a tensor of inertia about its centre."""
-    principal, size = np.linalg.eigvalsh(tensor), float(np.abs(tensor).max())
-    excess = principal[2] - principal[0] - principal[1]
-    if principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_SLACK * size:
-        return
-    rounded = principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_ROUNDING * size
-    moments = ", ".join(f"{axis:.4g}" for axis in principal)
-    what = f"no body has the principal moments {moments} kg m² about its centre: one exceeds the sum of the others"
-    remedy = "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)"
-    if rounded:
-        what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"
-    yield Finding(what, path, remedy, Severity.WARNING if rounded else Severity.ERROR)
+        if not np.isfinite(tensor).all():
+            return
+        principal, size = np.linalg.eigvalsh(tensor), float(np.abs(tensor).max())
+        excess, slack = principal[2] - principal[0] - principal[1], INERTIA_SLACK * size
+        if principal[0] < -slack or excess > slack:
+            rounded = principal[0] >= -slack and excess <= INERTIA_ROUNDING * size
+            moments = ", ".join(f"{axis:.4g}" for axis in principal)
+            what = (
+                f"no body has the principal moments {moments} kg m² about its centre: one exceeds the sum of the others"
+            )
+            remedy = "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)"
+            if rounded:
+                what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"
+            yield Finding(what, path, remedy, Severity.WARNING if rounded else Severity.ERROR)

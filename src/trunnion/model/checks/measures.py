@@ -38,7 +38,7 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
     axis, along, of_angle = measure.axis is not None, measure.along is not None, key == "angle"
     figure, at, over = measure.statistic, measure.at is not None, measure.over is not None
     dwell, lasting = figure == "dwell", kind.in_time or name == "cycle" or key == "time_ratio"
-    placed = key == "dead_centre" and figure in PLACES
+    placed, whole = key == "dead_centre" and figure in PLACES, measure.reduced
     yield from faults(
         where,
         (joint and kind.of == "joint" and (motion not in moves if key in ("rotation", "slide") else not moves), key,
@@ -55,18 +55,16 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
         (along and of_angle, "along", "is a direction, and an angle needs an axis"),
         (measure.axis == "z" and mechanism.space == "planar", "axis", "there is no z in the plane"),
         # where and how it is taken
-        (dwell and measure.within is None, "", "a dwell is within a band", "add within: [10 mm, 12 mm]"),
-        (not dwell and measure.within is not None, "within", "a band is stated, but no dwell", "add as: dwell"),
+        (dwell == (measure.within is None), "within", "a dwell is within a band, and only that",
+         "state as: dwell with within: [10 mm, 12 mm]"),
         (measure.duration is not None and not kind.in_time, "duration", "a duration is of a motion in time"),
         ((at or over) and not mechanism.drivers, "at" if at else "over",
          "there is no driver whose coordinate it could be: the mechanism has one position"),
         (over and lasting, "over", f"the {key} is over all of it"),
-        (at and measure.reduced, "at", f"the {key} is of a range, not of a position"),
-        (figure is not None and measure.reduced and not placed, "as", f"the {key} is one number of a range already",
-         f"remove it; of a dead_centre write {' or '.join(PLACES)}"),
-        (at and not measure.reduced and figure not in (None, "value"), "as",
-         f"the {figure} is of a range, not of a position", "state over: [0 deg, 90 deg] instead of at"),
-        (not at and not measure.reduced and figure == "value", "as", "a value is that at a position", "add at: 60 deg"),
+        (whole and (at or (figure is not None and not placed)), "at" if at else "as",
+         f"the {key} is one number of a range already", f"remove it; of a dead_centre write {' or '.join(PLACES)}"),
+        (not whole and figure is not None and at != (figure == "value"), "as",
+         f"the {figure} is {'of a range, not of' if at else 'that at'} a position", "state over: or at: …"),
     )  # fmt: skip
 
 

@@ -59,7 +59,9 @@ def settled(
 def missed(found: Settled, contacts: Sequence[tuple[ContactLoad, Any]]) -> Array:
     """Largest |friction − law| of each lane over its largest friction, from what was found alone."""
     with np.errstate(all="ignore"):
-        law = [f * load.normal(reaction) for (load, f), reaction in zip(contacts, found.reactions, strict=True)]
+        law = [
+            f * load.normal(load.felt(reaction)) for (load, f), reaction in zip(contacts, found.reactions, strict=True)
+        ]
         gaps = np.max([np.abs(a - b) for a, b in zip(found.forces, law, strict=True)], axis=0)
         return np.asarray(gaps / np.max(np.abs(found.forces), axis=0))
 

@@ -108,13 +108,13 @@ def test_a_guide_in_the_plane_is_loaded_at_its_two_ends(off: float) -> None:
     guide = GuideLoad(across=(0.0, 1.0), length=LENGTH)
     ends = [70.0 * (0.5 + sign * off) for sign in (1, -1)]
     assert of(guide, 11.0, 70.0, 70.0 * off * LENGTH) == pytest.approx(sum(abs(end) for end in ends))
-    moved = GuideLoad(across=(0.0, 1.0), length=LENGTH, arm=(off * LENGTH, 0.02))
+    moved = GuideLoad(across=(0.0, 1.0), length=LENGTH, middle=(off * LENGTH, 0.02))
     assert of(moved, 11.0, 70.0, 70.0 * off * LENGTH - 11.0 * 0.02) == pytest.approx(70.0)
 
 
 LOADS = {
     "pin": PinLoad(),
-    "guide in the plane": GuideLoad(across=(0.6, 0.8), length=LENGTH, arm=(0.04, -0.03)),
+    "guide in the plane": GuideLoad(across=(0.6, 0.8), length=LENGTH, middle=(0.04, -0.03)),
     "bearing": BearingLoad(ORIGIN, LENGTH),
     "bearing, summed": BearingLoad(ORIGIN, LENGTH, True),
     "guide": BearingLoad(ORIGIN, LENGTH, width=WIDTH),

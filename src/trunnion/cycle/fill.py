@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra import plane
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import moment_at, quaternion
 from trunnion.algebra.unwrap import unwrap_row
@@ -186,11 +187,10 @@ def _forces(back: Backward, read: Container[str]) -> Iterator[Cell]:
             yield from _vector("friction_moment", (i,), moment_at(friction, middle))
             yield "friction_force", (i,), dot(friction.u, walk.ends(joint)[1].z)
             continue
-        *force, moment = reaction
-        yield from _vector("reaction_force", (i,), force)
+        yield from _vector("reaction_force", (i,), reaction[:2])
         if not turns:
             yield "friction_force", (i,), back.friction[joint]
-            yield "reaction_moment", (i,), moment
+            yield "reaction_moment", (i,), plane.moment_at(reaction, plane.place_of(walk.ends(joint)[1]))
     for i, name in enumerate(mechanism.drivers):
         yield "drive_effort", (i,), back.efforts[name]
     for i, name in enumerate(mechanism.springs):

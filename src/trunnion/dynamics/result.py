@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.signal import periodogram
 
 from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot
 from trunnion.cycle import fill
@@ -225,10 +224,8 @@ class Stated:
                     rubbing[joint] = walk.algebra.added(rubbing[joint], loss)
             if isinstance(walk, SpatialWalk):
                 friction[joint] = dot(moment_at(rubbing[joint], bearing_middle(walk, joint)), walk.ends(joint)[1].z)
-            else:  # about the joint's point on the second link
-                moment = walk.algebra.moment_at(reaction, walk.point(second, joint).place)
-                reaction = Wrench(reaction.x, reaction.y, moment)
-                friction[joint] = moment if system.turns(joint) else 0.0
+            elif system.turns(joint):
+                friction[joint] = walk.algebra.moment_at(reaction, walk.point(second, joint).place)
             reactions[joint] = reaction
         return replace(
             back, walk=walk, reactions=reactions, friction=friction, friction_wrenches=rubbing, margin=None,

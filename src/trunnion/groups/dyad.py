@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from trunnion.algebra import literal
-from trunnion.algebra.literal import less, plus
+from trunnion.algebra.literal import less
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import (
     Frame,
@@ -30,9 +30,7 @@ from trunnion.algebra.plane import (
     bracket,
     line_of,
     minus,
-    moment_at,
     place_of,
-    point_of,
     power,
     times,
     turned_vector,
@@ -48,8 +46,8 @@ ROUNDING = 1e-15  # of the terms of a difference: a few units in the last place
 class DyadPose(NamedTuple):
     """Frames of i, j; screws of B, C, D; the wrenches that C passes; their powers and 1/determinant of these.
 
-    guides: for each joint that slides its point on the second link; place: of C; lost: what is lost of the force that
-    one link puts on the other, as 1/area is what moves; scale: of both together; closure: opening of the dyad, m.
+    place: of C; lost: what is lost of the force that one link puts on the other, as 1/area is what moves; scale: of
+    both together; closure: opening of the dyad, m.
     """
 
     frames: tuple[Frame, Frame]
@@ -57,7 +55,6 @@ class DyadPose(NamedTuple):
     walls: tuple[Wrench, Wrench]
     matrix: tuple[Vector2, Vector2]
     area: Number
-    guides: tuple[Vector2 | None, Vector2 | None, Vector2 | None]
     place: Vector2
     lost: Number
     scale: Number
@@ -87,7 +84,7 @@ class Dyad(ABC):
         closure: Number,
     ) -> DyadPose:
         """The pose from the frames of the links. inner: the element of C on j, global; lost, scale: see `DyadPose`."""
-        (b, b_i), _, (d, d_j) = elements
+        b, d = elements[0][0], elements[2][0]
         slides = [letter == "P" for letter in self.letters]
         s_b, s_c, s_d = (
             Twist(frame.c, frame.s, 0.0) if slide else line_of(frame)
@@ -100,12 +97,7 @@ class Dyad(ABC):
         matrix = (-power(walls[0], s_b), power(walls[0], s_d)), (-power(walls[1], s_b), power(walls[1], s_d))
         moves = less(literal.times(matrix[0][0], matrix[1][1]), literal.times(matrix[0][1], matrix[1][0]))
         area = 1 / (np.float64(moves) if isinstance(moves, float) else moves)  # of Python's own 0 it would raise
-        guides = (
-            point_of(frames[0], place_of(b_i)) if slides[0] else None,
-            place if slides[1] else None,
-            point_of(frames[1], place_of(d_j)) if slides[2] else None,
-        )
-        return DyadPose(frames, (s_b, s_c, s_d), walls, matrix, area, guides, place, lost, scale, closure)
+        return DyadPose(frames, (s_b, s_c, s_d), walls, matrix, area, place, lost, scale, closure)
 
     def moved(
         self,
@@ -141,7 +133,7 @@ class Dyad(ABC):
         )
 
     def reactions(self, pose: DyadPose, loads: Sequence[Wrench]) -> list[Wrench]:
-        """Reactions on i at B, on j at C and at D, each about the joint's point on its second link.
+        """Reactions on i at B, on j at C and at D, about the origin.
 
         loads: all else that acts on i and j, inertia and friction included.  [D 2-7, with friction 12-13]
         """
@@ -149,18 +141,8 @@ class Dyad(ABC):
         p, q = (literal.times(power(load, screw), pose.area) for load, screw in zip(loads, (s_b, s_d), strict=True))
         first = less(literal.times(q, c), literal.times(p, d))
         second = less(literal.times(p, b), literal.times(q, a))
-        if self.letters[1] == "P":
-            x, y, couple = *turned_vector(pose.screws[1].x, pose.screws[1].y, 0.0, first), second
-        else:
-            x, y, couple = first, second, 0.0
-        on_i, on_j = loads
-        at_b = Wrench(less(x, on_i.x), less(y, on_i.y), 0.0)
-        at_d = Wrench(less(-x, on_j.x), less(-y, on_j.y), 0.0)
-        if pose.guides[0] is not None:
-            at_b = at_b._replace(m=_passed(pose, x, y, couple, pose.guides[0]) - moment_at(on_i, pose.guides[0]))
-        if pose.guides[2] is not None:
-            at_d = at_d._replace(m=-(_passed(pose, x, y, couple, pose.guides[2]) + moment_at(on_j, pose.guides[2])))
-        return [at_b, Wrench(x, y, couple), at_d]
+        at_c = added(times(first, pose.walls[0]), times(second, pose.walls[1]))
+        return [minus(at_c, loads[0]), at_c, times(-1.0, added(at_c, loads[1]))]
 
     def closure(self, pose: DyadPose) -> Number:
         """By how much the dyad is open, m."""
@@ -169,11 +151,6 @@ class Dyad(ABC):
     def condition(self, pose: DyadPose) -> Number:
         """Frobenius condition of the unit vectors of its dead centre: 2 at best, without bound there."""
         return 2 * pose.scale * namespace(pose.area).abs(pose.area)
-
-
-def _passed(pose: DyadPose, x: Number, y: Number, couple: Number, at: Vector2) -> Number:
-    """Moment about a point of the force and the couple in C."""
-    return plus(couple, (pose.place[0] - at[0]) * y - (pose.place[1] - at[1]) * x)
 
 
 def pinned(pin: Frame, local: Frame, reach: Vector2, side: Vector2, square: Number) -> Frame:

@@ -1,4 +1,4 @@
-"""Any planar module: what its chords ask for, gear pairs, and reactions as the joints of the plane have them.
+"""Any planar module: what its chords ask for, and gear pairs.
 
 The coordinates are those of the tree. A pin that the tree leaves out asks two points to meet, a guide asks a point to
 stay on the axis and two directions to agree; a driven one also prescribes its coordinate.
@@ -16,9 +16,9 @@ import numpy as np
 from trunnion.algebra import plane
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.plane import Frame, Twist, Wrench, about, moment_at, place_of, velocity_at
+from trunnion.algebra.plane import Frame, Twist, Wrench, about, place_of, velocity_at
 from trunnion.groups.gear import NUMBERS, GearPair, actions, slide_of, turn_from
-from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
+from trunnion.groups.tree import Coordinates, Element, Pose, Tree
 from trunnion.joints.pair_motion import MOTIONS, PairMotion
 
 __all__ = ["General"]
@@ -29,9 +29,9 @@ class General(Tree):
     """The planar module with the given joints and gear pairs.
 
     A joint between known links that a gear pair speaks of is listed too, at the end, with both sides OUTER. After the
-    driven coordinates the drive holds three numbers for each gear pair (see `gear.NUMBERS`). Its reactions are about
-    the joint's point on the second link; after the joints come the gear pairs, each with the torque, or force along the
-    slide, that it puts into its second joint, as a moment.
+    driven coordinates the drive holds three numbers for each gear pair (see `gear.NUMBERS`). After the reactions of the
+    joints come the gear pairs, each with the torque, or force along the slide, that it puts into its second joint, as a
+    moment.
     """
 
     gears: tuple[GearPair, ...] = ()
@@ -193,13 +193,6 @@ class General(Tree):
         """Of the joints, then what each gear pair puts into its second joint."""
         efforts = self._efforts(pose, multipliers)
         return super().link_by_link(pose, loads, multipliers) + [Wrench(0.0, 0.0, effort) for effort in efforts]
-
-    def at_joint(self, pose: Pose, k: int, wrench: Wrench) -> Wrench:
-        """About the joint's point on its second link, where a pin that is not driven carries no moment."""
-        if self.joints[k].sides == (OUTER, OUTER):
-            return wrench
-        free = self.joints[k].pair.turns and k not in self.driven
-        return Wrench(wrench.x, wrench.y, 0.0 if free else moment_at(wrench, place_of(pose.elements[k][1])))
 
     def signature(self, pose: Pose, spread: float) -> list[Number]:
         """Places and directions of the links."""

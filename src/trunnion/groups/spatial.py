@@ -27,7 +27,7 @@ __all__ = ["SpatialGroup"]
 
 @dataclass(frozen=True)
 class SpatialGroup(Tree):
-    """The module with the given joints; its reactions are about the origin.
+    """The module with the given joints.
 
     spinning: links whose spin is free, each with the two joints between which it is.
     """

@@ -543,7 +543,7 @@ class Tree(ABC):
         drive effort. Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link. supports: of
         the joints, which share what statics leaves open.
         """
-        multipliers, count = self.multipliers(pose, loads), len(self.joints)
+        multipliers = self.multipliers(pose, loads)
         if self.redundant and multipliers:
 
             def energy(under: Sequence[Number], loaded: bool) -> NDArray[np.float64]:
@@ -552,12 +552,7 @@ class Tree(ABC):
                 return redundant.weighed(self.algebra, wrenches, pose.elements, supports, pose.size)
 
             multipliers = redundant.least(pose.jacobian, energy, multipliers)
-        wrenches = self.link_by_link(pose, loads, multipliers)
-        return [self.at_joint(pose, k, wrench) for k, wrench in enumerate(wrenches[:count])] + wrenches[count:]
-
-    def at_joint(self, pose: Pose, k: int, wrench: Any) -> Any:
-        """A joint's wrench about what its reaction is about: in space the origin."""
-        return wrench
+        return self.link_by_link(pose, loads, multipliers)
 
     def link_by_link(self, pose: Pose, loads: Sequence[Any], multipliers: Sequence[Number]) -> list[Any]:
         """The wrenches of all joints from those of the loops."""

@@ -1,8 +1,8 @@
 """How the reaction of a joint presses on its contact: pins, balls, bearings, guides and threads.
 
-A planar reaction is (F_x, F_y, M) about the joint's point, N and N m; one in space the flat tuple
-(F_x, F_y, F_z, M_x, M_y, M_z) of the wrench about the origin of the global frame. Every normal load here is a seminorm
-of it, as the certificate of `friction.FrictionProblem.bound` asks.
+A reaction is the flat tuple (F_x, F_y, M), in space (F_x, F_y, F_z, M_x, M_y, M_z), of the wrench about the origin of
+the global frame, N and N m. Every normal load here is a seminorm of it, as the certificate of
+`friction.FrictionProblem.bound` asks.
 
 A bearing of length L about the axis u carries the load F⊥, M⊥ across its axis, M⊥ about its middle:
 
@@ -21,6 +21,7 @@ from typing import Self
 
 import numpy as np
 
+from trunnion.algebra import plane
 from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
@@ -28,7 +29,7 @@ from trunnion.algebra.nested import each
 from trunnion.algebra.space import Frame
 from trunnion.algebra.vector import Vector3, cross, dot, minus
 
-__all__ = ["BallLoad", "BearingLoad", "ContactLoad", "GuideLoad", "PinLoad", "Reaction", "halves"]
+__all__ = ["BearingLoad", "ContactLoad", "GuideLoad", "PinLoad", "Reaction", "halves"]
 
 Reaction = tuple[Number, ...]
 
@@ -89,76 +90,12 @@ def _shares(size: Number, *parts: Number) -> tuple[Number, ...]:
     return tuple([part * factor for part in parts])
 
 
-# ---- in the plane ---------------------------------------------------------------------------------------------
-
-
 class PinLoad(ContactLoad):
-    """A pin: N = |F|; it feels no moment.  [D 8]"""
-
-    def normal(self, reaction: Reaction) -> Number:
-        """|F|."""
-        return _length(*reaction[:2])
-
-    def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
-        """F/|F|."""
-        return (*_shares(normal, *reaction[:2]), 0.0)
-
-    def bound(self, reaction: Reaction) -> Number:
-        """|F_x| + |F_y|."""
-        return np.abs(reaction[0]) + np.abs(reaction[1])
-
-    def feels(self, reaction: Reaction) -> bool:
-        """Whether there is a force."""
-        return not all(map(is_zero, reaction[:2]))
-
-
-@dataclass(frozen=True)
-class GuideLoad(ContactLoad):
-    """A guide of a length L, m, loaded off its middle, carries on its two ends, as a bearing does in space:
-
-    N = |F_n/2 + M/L| + |F_n/2 − M/L| = max(|F_n|, 2 |M|/L), F_n along the unit vector `across`.
-
-    arm: from the point that the moment is about to the middle of the guide, m; None if that is the point.
-    """
-
-    across: tuple[Number, Number]
-    length: Number
-    arm: tuple[Number, Number] | None = None
-
-    def normal(self, reaction: Reaction) -> Number:
-        """The larger of both."""
-        push, couple = self._parts(reaction)
-        xp = namespace(push, couple)
-        return xp.maximum(xp.abs(push), xp.abs(couple))
-
-    def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
-        """By that which is larger."""
-        push, couple = self._parts(reaction)
-        xp = namespace(*reaction[:2])
-        shifted = xp.abs(push) >= xp.abs(couple)
-        along = xp.where(shifted, xp.sign(push), 0.0)
-        turn = xp.where(shifted, 0.0, xp.sign(couple)) * (2 / self.length)
-        gx, gy = along * self.across[0], along * self.across[1]
-        if self.arm is None:
-            return gx, gy, turn
-        return gx + turn * self.arm[1], gy - turn * self.arm[0], turn
-
-    def _parts(self, reaction: Reaction) -> tuple[Number, Number]:
-        """F_n and 2 M/L."""
-        x, y, m = reaction
-        moment = m if self.arm is None else m - (self.arm[0] * y - self.arm[1] * x)
-        return x * self.across[0] + y * self.across[1], moment * (2 / self.length)
-
-
-# ---- in space -------------------------------------------------------------------------------------------------
-
-
-class BallLoad(ContactLoad):
-    """A ball: N = |F|."""
+    """A pin of the plane, or a ball: N = |F|; it feels no moment.  [D 8]"""
 
     def felt(self, reaction: Reaction) -> Reaction:
-        """The force."""
-        return reaction[:3]
+        """The force: of three numbers two, of six three."""
+        return reaction[: (len(reaction) + 1) // 2]
 
     def normal(self, reaction: Reaction) -> Number:
         """|F|."""
@@ -167,6 +104,44 @@ class BallLoad(ContactLoad):
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
         """F/|F|."""
         return _shares(normal, *reaction)
+
+    def bound(self, reaction: Reaction) -> Number:
+        """|F_x| + |F_y| in the plane."""
+        return np.abs(reaction[0]) + np.abs(reaction[1]) if len(reaction) == 2 else _length(*reaction)
+
+    def feels(self, reaction: Reaction) -> bool:
+        """Whether there is a force."""
+        return not all(map(is_zero, reaction))
+
+
+@dataclass(frozen=True)
+class GuideLoad(ContactLoad):
+    """A guide of a length L, m, loaded off its middle, carries on its two ends, as a bearing does in space:
+
+    N = |F_n/2 + M/L| + |F_n/2 − M/L| = max(|F_n|, 2 |M|/L), F_n along the unit vector `across`, M about the middle.
+    """
+
+    across: tuple[Number, Number]
+    length: Number
+    middle: tuple[Number, Number] = (0.0, 0.0)
+
+    def felt(self, reaction: Reaction) -> Reaction:
+        """F_n and 2 M/L."""
+        x, y, m = reaction
+        moment = plane.moment_at(plane.Wrench(x, y, m), self.middle)
+        return x * self.across[0] + y * self.across[1], moment * (2 / self.length)
+
+    def normal(self, reaction: Reaction) -> Number:
+        """The larger of both."""
+        xp = namespace(*reaction)
+        return xp.maximum(*map(xp.abs, reaction))
+
+    def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
+        """By that which is larger."""
+        push, couple = reaction
+        xp = namespace(push, couple)
+        larger = xp.abs(push) >= xp.abs(couple)
+        return xp.where(larger, xp.sign(push), 0.0), xp.where(larger, 0.0, xp.sign(couple))
 
 
 @dataclass(frozen=True)

@@ -70,19 +70,17 @@ class Backward:
     """What one walk backward found, by joint and driver as the file names them.
 
     loads: on each link, the wrenches of joints passed so far included; reactions: on the second link by the first,
-    friction and drive effort not included, in the plane about the joint's point on the second, in space about the
-    origin; friction: torque about the axis, N m, of a ball or a cross about the relative angular velocity, or force
-    along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction
-    is; losses: power that each joint loses, W, to friction, and where seats travel to its load on the way of its
-    pin; drags: effort and power, W, of losses that do not follow the load, which are part of both; contacts: those
+    friction and drive effort not included; friction: torque about the axis, N m, of a ball or a cross about the
+    relative angular velocity, or force along the slide, N, on the second link; friction_wrenches: all that friction
+    does to it; losses: power that each joint loses, W, to friction, and where seats travel to its load on the way of
+    its pin; drags: effort and power, W, of losses that do not follow the load, which are part of both; contacts: those
     of each joint that rubs; resting: where what resists each joint sees it at rest; settled: per module; undefined:
-    where each load or spring (by path) has no value; turning: of joints that rub and turn, the friction force about
-    the axis for each newton of normal load, and the slip; spins: torque that each link with a free spin would need
-    to keep from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move
-    apart; threads: friction torque and power lost in the threads of screws, by the joint that turns;
-    module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
-    contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
-    `locking_margin`, once it was asked for.
+    where each load or spring (by path) has no value; turning: of joints that rub and turn, the friction force about the
+    axis for each newton of normal load, and the slip; spins: torque that each link with a free spin would need to keep
+    from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move apart; threads:
+    friction torque and power lost in the threads of screws, by the joint that turns; module_reactions: reactions as
+    their modules see them. stated: loads before any joint was passed; rubbed: contacts per module as `settled`, those
+    of gear pairs last; margin_up_to: as in the method; margin: that of `locking_margin`, once it was asked for.
     """
 
     walk: Forward
@@ -285,8 +283,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, conditio
         for i, rub in enumerate(() if place.witness or joint in system.screws else back.contacts.get(joint, ())):
             slope, slip, felt = _felt(back, joint, rub, conditions, i)
             first, second = system.joints[joint][1]
-            unit = walk.on_link(second, rub.unit, joint)
-            on = {first: walk.algebra.times(-1.0, unit), second: unit}
+            on = {first: walk.algebra.times(-1.0, rub.unit), second: rub.unit}
             units_ = [on.get(link, walk.algebra.ZERO_LOAD) for link in module.links]
             own = tuple(flat(rub.unit)) if rub.felt else None
             rubbed.append((Contact(k, units_, rub.load, slope, own=own), felt))
@@ -395,18 +392,18 @@ def _record(
         back.efforts[joint] = algebra.power(wrench, motion)
         reaction = algebra.minus(wrench, algebra.times(back.efforts[joint], unit))
     else:
-        reaction = walk.bare(joint, wrench)
+        reaction = wrench
     if joint in back.drags:  # what it loses whatever its load: the links bear it already
         effort, drag = back.drags[joint]
         friction = algebra.added(friction, algebra.times(effort, walk.axis(joint, turns)[1]))
         amount, loss = amount + effort, loss + drag
     if back.travels:  # what the joint takes out and its driver does not put in
         put_in = back.efforts[joint] * walk.rate(joint) if driven else 0.0
-        loss = put_in - algebra.power(walk.on_link(second, total, joint), walk.against(joint))
+        loss = put_in - algebra.power(total, walk.against(joint))
         loss = loss + back.threads[joint][1] if joint in back.threads else loss
         loss = loss + back.drags[joint][1] if joint in back.drags else loss
     back.reactions[joint], back.friction_wrenches[joint] = reaction, friction
     back.friction[joint], back.losses[joint] = amount, loss
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
-            back.add(link, walk.on_link(link, total if link == second else algebra.times(-1.0, total), joint))
+            back.add(link, total if link == second else algebra.times(-1.0, total))

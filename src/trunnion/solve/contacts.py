@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.algebra import plane
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Frame, Screw, about, moment_at
 from trunnion.algebra.vector import Vector3, cross, dot, minus, plus, scaled
-from trunnion.joints.contact_loads import BallLoad, BearingLoad, GuideLoad, PinLoad
+from trunnion.joints.contact_loads import BearingLoad, GuideLoad, PinLoad
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction import Rubbing
@@ -68,8 +69,9 @@ def loads_on_ends(walk: Forward, joint: str, reaction: Any, friction: Any) -> li
     path, pair = f"joints.{joint}", PAIRS[walk.system.joints[joint][0]]
     length = walk.values[f"{path}.guide.length" if pair.guided else f"{path}.pin.bearing"]
     if not isinstance(walk, SpatialWalk):
-        axis = walk.ends(joint)[0]
-        half, couple = 0.5 * (axis.c * reaction.y - axis.s * reaction.x), reaction.m / length
+        axis, second = walk.ends(joint)
+        couple = plane.moment_at(reaction, plane.place_of(second)) / length
+        half = 0.5 * (axis.c * reaction.y - axis.s * reaction.x)
         return [scaled(load, (-axis.s, axis.c, 0.0)) for load in (half - couple, half + couple)]
     wrench = walk.algebra.added(reaction, friction) if pair.crossed else reaction
     force, moment = wrench.u, moment_at(wrench, bearing_middle(walk, joint))
@@ -102,11 +104,10 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
         lever, turning = _lever(walk, joint)
         yield Rubbing(PinLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=turning)
         return
-    axis, middle = walk.ends(joint)
-    at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
-    arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
-    load = GuideLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
-    yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)
+    axis, second = walk.ends(joint)
+    middle = plane.place_of(second)
+    load = GuideLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], middle)
+    yield Rubbing(load, speed, plane.about((axis.c, axis.s), 0.0, middle), zero)
 
 
 def _lever(walk: Forward, joint: str) -> tuple[Number, Number | None]:
@@ -200,7 +201,7 @@ def _ball(walk: SpatialWalk, joint: str) -> Rubbing:
     speed, share = _speed(square, primal(square) > 0)
     unit = Screw(NULL, scaled(radius, scaled(share, turn)))
     zero = walk.speed(joint) <= walk.noise(joint, turns=True)
-    return Rubbing(BallLoad(), radius * speed, unit, zero, amount=radius, turning=1.0)
+    return Rubbing(PinLoad(), radius * speed, unit, zero, amount=radius, turning=1.0)
 
 
 def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3) -> Iterator[Rubbing]:

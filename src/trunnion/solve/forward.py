@@ -1,7 +1,6 @@
 """Motion, forward through the row of modules: poses, velocities, accelerations of all links.
 
-Twists and wrenches of a link are about the origin of the global frame; so are those of a joint in space. A joint of the
-plane has its wrench about its point on its second link, where a pin carries no moment.
+Twists and wrenches are about the origin of the global frame.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from trunnion.algebra.plane import Twist, Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, minus, plus, scaled, transpose
 from trunnion.groups.tree import Element
-from trunnion.joints.contact_loads import Reaction, halves
+from trunnion.joints.contact_loads import Reaction
 from trunnion.joints.pairs import PAIRS, Pair
 from trunnion.model.parts import InertiaTensor
 from trunnion.solve import shifts
@@ -309,9 +308,8 @@ class Forward:
 
     def in_hole(self, joint: str, wrench: Any) -> tuple[Vector, Vector]:
         """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
-        hole, at = self.hole(joint), self.ends(joint)[1]
-        x, y, _ = wrench
-        moment = plane.moment_at(wrench, (hole.x - at.x, hole.y - at.y))
+        hole, (x, y, _) = self.hole(joint), wrench
+        moment = plane.moment_at(wrench, plane.place_of(hole))
         return (x * hole.c + y * hole.s, y * hole.c - x * hole.s), (moment,)
 
     def frame_rate(self, frame: Any) -> Any:
@@ -322,20 +320,16 @@ class Forward:
 
     def axis(self, joint: str, turns: bool) -> tuple[Any, Any]:
         """A joint's motion at unit rate of its turn or slide, and the wrench of a unit effort in it."""
+        along, second = self.ends(joint)
         if turns:
-            return Twist(0.0, 0.0, 1.0), Wrench(0.0, 0.0, 1.0)
-        along = self.ends(joint)[0]
-        return Twist(along.c, along.s, 0.0), Wrench(along.c, along.s, 0.0)
+            return plane.line_of(second), Wrench(0.0, 0.0, 1.0)
+        return Twist(along.c, along.s, 0.0), plane.about((along.c, along.s), 0.0, plane.place_of(second))
 
     def freedom(self, joint: str, turns: bool) -> tuple[Any, Any]:
         """The same of what a driver moves, with the slide along its thread."""
         twist, effort = self.axis(joint, turns)
         lead = self.system.lead(self.values, joint)
         return twist if is_zero(lead) else self.algebra.added(twist, self.algebra.times(lead, effort)), effort
-
-    def on_link(self, link: str, wrench: Any, joint: str) -> Any:
-        """A joint's wrench about the origin."""
-        return plane.about(wrench[:2], wrench.m, plane.place_of(self.ends(joint)[1]))
 
     def reactions(self, number: int, loads: Sequence[Any], group: Any = None) -> list[Reaction]:
         """Reactions of a module to loads on its links, flat. group: in place of the module itself."""
@@ -347,19 +341,9 @@ class Forward:
 
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction on a joint's second link as the file names it; a module may see it from the other."""
-        force = Wrench(*reaction)
-        if not place.reversed_:
-            return force
-        force = plane.times(-1.0, force)
-        if self.system.turns(place.joint):
-            return force
-        first, second = self.ends(place.joint)  # the module's second point is the file's first
-        return Wrench(force.x, force.y, plane.moment_at(force, (second.x - first.x, second.y - first.y)))
-
-    def bare(self, joint: str, wrench: Any) -> Any:
-        """A reaction without what acts along the freedom of its joint: rounding, and of a pin exactly nothing."""
-        motion, unit = self.freedom(joint, self.system.turns(joint))
-        return plane.minus(wrench, plane.times(plane.power(wrench, motion), unit))
+        numbers = iter(reaction)
+        wrench = each(self.algebra.ZERO_LOAD, lambda _: next(numbers))
+        return self.algebra.times(-1.0, wrench) if place.reversed_ else wrench
 
     def inertia_moment(self, link: str) -> Any:
         """−J α about the mass centre, N m; None of a link without inertia.  [D 2-5]"""
@@ -490,18 +474,6 @@ class SpatialWalk(Forward):
         return (line, along) if turns else (along, line)
 
     # ---- forces -----------------------------------------------------------------------------------------------
-
-    def on_link(self, link: str, wrench: Any, joint: str) -> Any:
-        """A joint's wrench about the origin: the same."""
-        return wrench
-
-    def wrench(self, place: Place, reaction: Reaction) -> Any:
-        """The reaction of a joint."""
-        return Screw(*halves(reaction))
-
-    def bare(self, joint: str, wrench: Any) -> Any:
-        """The reaction of a joint without a driver: as it is."""
-        return wrench
 
     def inertia_moment(self, link: str) -> Any:
         """−(J ω̇ + ω × J ω) about the mass centre, N m, J in the link's own axes; None of a link without.  [P 21]"""

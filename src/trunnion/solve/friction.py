@@ -72,7 +72,7 @@ class Contact(NamedTuple):
 
 class Rubbing(NamedTuple):
     """One contact of a joint, before its law is asked: load, slip speed, m/s, wrench of a unit friction along the slip
-    on the second link, about what the joint's own wrench is about, and where the speed is zero but for rounding.
+    on the second link, and where the speed is zero but for rounding.
 
     amount: what a unit friction is of the joint's friction torque, m, or force; felt: whether the joint itself feels
     its friction; turning: the share of the friction that acts about the joint's own axis and so turns the pin's seat,

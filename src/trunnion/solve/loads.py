@@ -228,8 +228,7 @@ def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Num
     """An effort in the freedom of a joint, on its second link by its first: N m about its axis, or N along it."""
     first, second = walk.system.joints[joint][1]
     wrench, times = walk.axis(joint, turns)[1], walk.algebra.times
-    on = [(link, walk.on_link(link, times(size, wrench), joint)) for link, size in ((second, effort), (first, -effort))]
-    return LoadAction(on, effort * speed)
+    return LoadAction([(second, times(effort, wrench)), (first, times(-effort, wrench))], effort * speed)
 
 
 # ---- losses of joints ------------------------------------------------------------------------------------------

@@ -371,11 +371,6 @@ class System:
         return tuple(values[f"{path}.{axis}"] for axis in self.axes)
 
     @cached_property
-    def reversed(self) -> frozenset[str]:
-        """Joints that their module sees from their second link."""
-        return frozenset(place.joint for places in self.places for place in places if place.reversed_)
-
-    @cached_property
     def lossy(self) -> dict[str, Losses]:
         """Joints with losses that do not follow their load."""
         joints = self.mechanism.effective_joints.items()

@@ -98,7 +98,7 @@ def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -
     stresses, motions, none = list[Array](), list[Array](), [group.algebra.ZERO_LOAD] * group.links
     for null in np.moveaxis(left, -1, 0)[rank:]:  # the wrenches of a self-stress, (joint, 6 or 3, lane)
         wrenches = group.link_by_link(pose, none, list(null.T))
-        stresses.append(_table([group.at_joint(pose, k, wrenches[k]) for k in range(len(group.joints))], lanes))
+        stresses.append(_table(wrenches[: len(group.joints)], lanes))
     for null in np.moveaxis(right, -2, 0)[rank:]:  # the twists of a motion that nothing determines
         rates = group.unmoved()
         for (k, i), rate in zip(group.free, null.T, strict=True):

@@ -11,7 +11,7 @@ import xarray as xr
 from trunnion.cli.app import main
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig import identification
-from trunnion.rig.identification import identify
+from trunnion.rig.identification.identify import identify
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = "pezzuti-cardan.yaml"

@@ -18,37 +18,29 @@ PRESSURE = {"at": "Q", "link": "piston", "force": ["-pressure * pi / 4 * bore^2"
 JUMP = {"at": "Q", "link": "piston", "force": ["-1.5 kN * between(drive, 290 deg, 355 deg)", 0], "useful": True}
 
 
-def marked(value: Any, bends: Any, u: float = 1e-3, **others: Any) -> list[int]:
-    size = len(value)
-    none = np.zeros(size, bool)
-    arguments = {"closed": True, "guard": 1, **others}
-    found = corners(value, np.arange(size) / size, np.array(bends), np.full(size, u), none, **arguments)
-    return np.flatnonzero(found).tolist()
+def marked(value: Any, u: float = 1e-3, guard: int = 1) -> list[int]:
+    return np.flatnonzero(corners(value, np.full(len(value), u), closed=True, guard=guard)).tolist()
 
 
 def test_a_corner_marks_the_positions_beside_it_where_it_shows() -> None:
     """|x − 30.4| over positions: a change of slope by 2 is rounded off by up to 2/8 = 0.25, 4 u is a quarter of it."""
-    x = np.arange(90.0)
-    roof = np.abs(x - 30.4) + 0.001 * x**2
-    assert marked(roof, [30.4 / 90], u=0.2) == [30, 31]
-    assert marked(roof, [30.4 / 90], u=2.0) == []
-    assert marked(roof, [], u=0.2) == []  # where the model does not bend it is a curve
-    assert marked(roof, [60.4 / 90], u=0.2) == []
+    roof = 5 * np.abs((np.arange(90) - 30.4 + 45) % 90 - 45)
+    assert marked(roof, u=1.0) == [30, 31, 75, 76]
+    assert marked(roof, u=10.0) == []
+    assert marked(100 * np.sin(2 * np.pi * np.arange(90) / 90)) == []  # a curve
 
 
-def test_a_curve_is_not_a_corner_and_a_jump_is_one() -> None:
-    x = np.arange(90.0)
-    wave = 100 * np.sin(2 * np.pi * x / 90)
-    assert marked(wave, [20 / 90]) == []
-    assert marked(wave + 10.0 * (x > 50.5), [50.5 / 90]) == [50, 51]
+def test_a_jump_is_a_corner() -> None:
+    wave = 100 * np.sin(2 * np.pi * np.arange(90) / 90)
+    step = (np.arange(90) > 50) * 10.0
+    assert {50, 51, 0, 89} <= set(marked(wave + step))
 
 
 def test_of_very_many_corners_the_largest_are_left_out() -> None:
     """At most a third of the positions, with the guard on both sides."""
     x = np.arange(360)
-    rough = np.where(x % 12 == 0, 1.0 + x / 360, 0.0)
-    found = marked(rough, np.arange(0, 360, 12) / 360, guard=4)
-    assert len(found) == 30
+    found = marked(np.where(x % 12 == 0, 1.0 + x / 360, 0.0), guard=4)
+    assert 90 < len(found) <= 120
     assert min(found) > 150
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import trunnion
 from trunnion.errors import Severity
-from trunnion.rig.identification import with_estimates
+from trunnion.rig.identification.identify import with_estimates
 from trunnion.views.identify import estimates
 
 GUIDE = "S.friction.coefficient"

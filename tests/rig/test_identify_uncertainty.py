@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from trunnion.rig.identification.fit import Block, Evaluations, Fit
+from trunnion.rig.identification.fit import Block, Fit, evaluations
 from trunnion.rig.identification.uncertainty import spread_of
 from trunnion.rig.reading.measurement import Signal
 
@@ -23,11 +23,9 @@ def constant(conditions: Sequence[Array]) -> Fit:
     """The mean of one channel in all conditions as the only unknown; turns: (turn, position) by condition."""
 
     def courses(x: Array) -> Any:
-        said = [
-            {"torque": SimpleNamespace(value=np.full(one.shape[1], x[0]), slope=np.ones((1, one.shape[1])))}
-            for one in conditions
-        ]
-        return SimpleNamespace(by_condition=said)
+        sizes = [one.shape[1] for one in conditions]
+        return [SimpleNamespace(values={"torque": np.full(size, x[0])}, slopes={"torque": np.ones((1, size))})
+                for size in sizes]  # fmt: skip
 
     measure = SimpleNamespace(turning=lambda system: False)
     model: Any = SimpleNamespace(
@@ -37,8 +35,8 @@ def constant(conditions: Sequence[Array]) -> Fit:
         run=SimpleNamespace(system=None),
     )
     blocks = [Block(k, "torque", Signal("torque", "effort:A", "N m", turns)) for k, turns in enumerate(conditions)]
-    fit = Fit(Evaluations(model), blocks, [])
-    return replace(fit, masks=[np.ones(one.shape[1], bool) for one in conditions], variances=fit.first_scatter())
+    fit = Fit(model, evaluations(model), blocks, [])
+    return replace(fit, masks=[np.ones(one.shape[1], bool) for one in conditions], variances=fit.scatter())
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])

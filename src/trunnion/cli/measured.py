@@ -143,7 +143,7 @@ def identify(
 
     Estimates, 95 % confidence intervals, and which parameters the data do not separate.
     """
-    from trunnion.rig.identification import identify as run
+    from trunnion.rig.identification.identify import identify as run
     from trunnion.rig.reading.read import read_measured
     from trunnion.rig.reading.timebase import gathered
     from trunnion.views.identify import tables
@@ -190,7 +190,7 @@ def parameters(texts: list[str]) -> dict[str, list[str]]:
 
 def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tuple[Mechanism | None, list[Finding]]":
     """The model with the estimates, if they are worth it, and findings about what is not in it."""
-    from trunnion.rig.identification import with_estimates
+    from trunnion.rig.identification.identify import with_estimates
 
     errors = {finding.code: finding.where for finding in findings_of(result) if finding.severity is Severity.ERROR}
     if "fit.misfit" in errors or "sensor.off" in errors:

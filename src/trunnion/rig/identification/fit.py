@@ -11,21 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 from scipy.optimize import least_squares
 
 from trunnion.errors import Status
 from trunnion.rig.identification.signals import Courses, Model
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, rms
 
-__all__ = ["FAR", "FILE_ZERO", "Block", "Fit", "SensorError", "Solution", "corners", "refined",
-           "sensor_errors", "shared_zero", "sizes_of", "solved"]  # fmt: skip
+__all__ = ["FAR", "Block", "Fit", "SensorError", "Solution", "corners", "evaluations", "refined", "sensor_errors",
+           "shared_zero", "sizes_of", "solved"]  # fmt: skip
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -97,10 +97,9 @@ class SensorError:
     """One error of a sensor, "zero" or "gain", or of the crank angle, "angle".
 
     channel: empty of the angle; sizes: its standard uncertainty in each block, in the unit of the course, relative, or
-    in shares of the cycle; 0 in blocks of other sensors. group: of one of many, what they are together; most:
-    what it may come to, in its standard uncertainties;
-    angle: of an error of the crank angle that has one size in all conditions, that, rad; stated: whether anything is
-    known of it; one that is not is free.
+    in shares of the cycle; 0 in blocks of other sensors. group: of one of many, what they are together; most: what it
+    may come to, in its standard uncertainties; angle: of an error of the crank angle that has one size in all
+    conditions, that, rad; stated: whether anything is known of it; one that is not is free.
     """
 
     name: str
@@ -111,12 +110,6 @@ class SensorError:
     most: float = FAR
     angle: float = 0.0
     stated: bool = True
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """In its standard uncertainties."""
-        most, largest = self.most if self.stated else inf, float(np.max(self.sizes))
-        return (max((LEAST - 1) / largest, -most) if self.kind == "gain" and largest > 0 else -most), most
 
 
 def shared_zero(accuracy: Accuracy) -> float:
@@ -158,44 +151,38 @@ def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequenc
 # ---- the problem ----------------------------------------------------------------------------------------------
 
 
-class Evaluations:
-    """The model at values of the unknowns; the last few are kept. progress: called with the number of evaluations."""
+def evaluations(model: Model, progress: Callable[[int], None] = lambda count: None) -> Any:
+    """The model as a function of the bytes of its unknowns; the last few are kept, and `cache_info` has their number.
 
-    def __init__(self, model: Model, progress: Callable[[int], None] = lambda count: None) -> None:
-        self.model, self.progress, self.count = model, progress, 0
-        self._last: dict[bytes, Courses] = {}
+    progress: called with how many there were.
+    """
 
-    def __call__(self, at: Array) -> Courses:
-        key = at.tobytes()
-        if key not in self._last:
-            while len(self._last) > 3:
-                self._last.pop(next(iter(self._last)))
-            self._last[key] = self.model.courses(at)
-            self.count += 1
-            self.progress(self.count)
-        return self._last[key]
+    @lru_cache(maxsize=4)
+    def courses(at: bytes) -> Sequence[Courses]:
+        progress(courses.cache_info().misses)
+        return model.courses(np.frombuffer(at))
+
+    return courses
 
 
 @dataclass(frozen=True)
 class Fit:
     """What is fitted: the model to the blocks, with errors of the sensors.
 
-    x stands for unknowns and sensors, (unknown and sensor,). masks: positions used, by block; variances: of one turn,
+    x stands for unknowns and sensors, (unknown and sensor,). evaluate: the courses at the bytes of the unknowns, see
+    `evaluations`. masks: positions used, by block; variances: of one turn,
     by block, as it is weighed; inflation: of these for a misfit, so that it does not outweigh what is stated of the
     sensors. Another choice of these is another Fit, see `refined`.
     """
 
-    courses_at: Evaluations
+    model: Model
+    evaluate: Any
     blocks: Sequence[Block]
     sensors: Sequence[SensorError]
     guard: int | None = None
     masks: Sequence[Mask] = ()
     variances: Sequence[float] = ()
     inflation: float = 1.0
-
-    @property
-    def model(self) -> Model:
-        return self.courses_at.model
 
     @property
     def count(self) -> int:
@@ -210,7 +197,7 @@ class Fit:
     @cached_property
     def start(self) -> Array:
         """Unknowns as stated, sensors without errors."""
-        return np.array([unknown.start for unknown in self.model.unknowns] + [0.0] * len(self.sensors))
+        return np.append(self.model.start, np.zeros(len(self.sensors)))
 
     @cached_property
     def prior(self) -> Array:
@@ -221,18 +208,22 @@ class Fit:
     def bounds(self) -> tuple[Array, Array]:
         """Limits of unknowns and sensors."""
         ends = [(unknown.lower, unknown.upper) for unknown in self.model.unknowns]
-        low, high = np.array([*ends, *(error.limits for error in self.sensors)]).T
+        for error in self.sensors:
+            most, largest = error.most if error.stated else inf, float(np.max(error.sizes))
+            least = (LEAST - 1) / largest if error.kind == "gain" and largest > 0 else -inf
+            ends.append((max(least, -most), most))
+        low, high = np.array(ends).T
         return low, high
 
-    def courses(self, x: Array) -> Courses:
-        """The model at the unknowns of x."""
-        return self.courses_at(np.asarray(x[: self.count], float))
+    def courses(self, x: Array) -> Sequence[Courses]:
+        """The model at the unknowns of x, by condition."""
+        return self.evaluate(np.asarray(x[: self.count], float).tobytes())  # type: ignore[no-any-return]
 
     def reading(self, x: Array, k: int) -> tuple[Array, Array]:
         """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        modelled, datum = self.courses(x).by_condition[block.condition][block.channel], block.signal.accuracy.datum
-        value, slope = modelled.value, modelled.slope
+        modelled, datum = self.courses(x)[block.condition], block.signal.accuracy.datum
+        value, slope = modelled.values[block.channel], modelled.slopes[block.channel]
         acting = [(s, error.kind, error.sizes[k]) for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]
         zero, gain, angle = (
             float(sum(size * x[s] for s, kind, size in acting if kind == of)) for of in ("zero", "gain", "angle")
@@ -271,67 +262,43 @@ class Fit:
         rows.append(np.diag(self.prior)[self.count :])
         return np.nan_to_num(np.concatenate(rows), nan=0.0, posinf=0.0, neginf=0.0)
 
-    # ---- what is used, and how much it weighs -----------------------------------------------------------------
-
     def allowed(self, x: Array) -> list[Mask]:
         """Positions of each block where the model has a sound answer and the data have a value."""
         masks, courses = [], self.courses(x)
         for k, block in enumerate(self.blocks):
-            status, turned = courses.status[block.condition], courses.turned[block.condition]
-            value = courses.by_condition[block.condition][block.channel].value
+            modelled = courses[block.condition]
+            value, status = modelled.values[block.channel], modelled.status
             if self.model.measures[block.channel].of_motion:  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
                 guard = -(-len(value) // PER_GUARD) if self.guard is None else self.guard
                 u = np.sqrt(self.variances[k] / np.maximum(block.signal.count, 1) + block.unresolved**2)
-                phase, bends = self.model.phases[block.condition], self.model.bends[block.condition]
-                closed = self.model.run.cycle.periodic
-                edges = turned | corners(value, phase, bends, u, turned, closed=closed, guard=guard)
-                for _ in range(guard - 1):
-                    edges = edges | np.roll(edges, 1) | np.roll(edges, -1)
-                good = (status == Status.SOLVED) & ~(edges & (guard > 0))
+                edges = beside(modelled.turned, guard)
+                edges |= corners(value, u, closed=self.model.run.cycle.periodic, guard=guard)
+                good = (status == Status.SOLVED) & ~edges
             masks.append(good & np.isfinite(block.signal.mean) & np.isfinite(value))
         return masks
 
-    def first_scatter(self) -> list[float]:
-        """Variances by the scatter of the turns; a guess where there is none."""
-        return [
-            block.variance if block.repeats else (GUESS * (rms(block.signal.mean) or 1.0)) ** 2 for block in self.blocks
-        ]
+    def scatter(self, x: Array | None = None) -> list[float]:
+        """Variances of one turn, by block: over the positions that are used at x, over all without it.
 
-    def learnt_scatter(self, x: Array) -> list[float]:
-        """Variances by channel: of blocks without repetitions by their residuals, of others by how far neighbours of a
-        turn vary together.
-
-        There it is the variance of the scores between turns over what independent positions would give, in all
-        directions that the unknowns move the course in; 1 for white noise.
+        Of blocks without repetitions those of the residuals of their channels at x, a guess without it.
         """
-        variances = self.first_scatter()
+        if x is None:
+            guesses = [(GUESS * (rms(block.signal.mean) or 1.0)) ** 2 for block in self.blocks]
+            return [block.variance if block.repeats else guesses[k] for k, block in enumerate(self.blocks)]
+        variances = list(self.variances)
         for channel in dict.fromkeys(block.channel for block in self.blocks):
-            every = [k for k in self.fitted if self.blocks[k].channel == channel and np.any(self.masks[k])]
-            if single := [k for k in every if not self.blocks[k].repeats]:
+            used = [k for k in self.fitted if self.blocks[k].channel == channel and np.any(self.masks[k])]
+            for k in (k for k in used if self.blocks[k].repeats):
+                pooled = self.blocks[k].pooled(self.masks[k])
+                variances[k] = pooled if pooled > 0 else variances[k]
+            if single := [k for k in used if not self.blocks[k].repeats]:
                 gap = np.concatenate([self.gap(x, k)[self.masks[k]] for k in single])
                 least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].signal.mean))) for k in single)) ** 2
                 learnt = max(float(np.sum(gap**2)) / max(gap.size - len(x), 1), least, 1e-300)
                 variances = [learnt if k in single else variance for k, variance in enumerate(variances)]
-            scores, white = 0.0, 0.0
-            for k in set(every) - set(single):
-                mask, block = self.masks[k], self.blocks[k]
-                basis = _basis(np.nan_to_num(self.reading(x, k)[1][:, mask]))
-                scores += float(np.sum((block.spread[:, mask] @ basis) ** 2)) / block.variance
-                white += basis.shape[1] * (len(block.signal.turns) - 1)
-            for k, block in enumerate(self.blocks):
-                if block.channel == channel and block.repeats and white:
-                    variances[k] *= max(scores / white, 0.05)
         return variances
-
-
-def _basis(rows: Array) -> Array:
-    """Orthonormal directions that rows span, (position, direction)."""
-    size = np.linalg.norm(rows, axis=1)
-    large = size > 1e-12 * np.max(size, initial=0.0)
-    _, sizes, directions = np.linalg.svd(rows[large] / size[large, None], full_matrices=False)
-    return np.asarray(directions[sizes > 1e-6 * np.max(sizes, initial=0.0)].T)
 
 
 NEARBY = 15  # positions about a corner, whose second differences tell it from a curve
@@ -341,41 +308,33 @@ TOO_MUCH = 0.25  # of the standard uncertainty of the mean: what is rounded off 
 MOST = 1 / 3  # of the positions, that are left out at corners: of a table of very many points the largest only
 
 
-def corners(
-    value: Array, phase: Array, bends: Array, uncertainty: Array, excluded: Mask, *, closed: bool, guard: int
-) -> Mask:
-    """The positions before and after each corner or jump that resampling rounds off by more than the data hide.
+def corners(value: Array, uncertainty: Array, *, closed: bool, guard: int) -> Mask:
+    """The positions about each corner or jump of a model's course that resampling rounds off by more than data hide.
 
     A value at a position is the mean of the samples about it, or lies on a cubic through four of them: a change of
     slope by d per position is rounded off by up to d/8, in every turn alike.
 
     Parameters
     ----------
-    value, phase, uncertainty : (position,), the course of the model, the share of the cycle, the standard uncertainty
-        of the measured mean.
-    bends : shares of the cycle at which the model may bend or jump.
-    excluded : (position,), where it is known to jump already.
+    value, uncertainty : (position,), the course of the model, the standard uncertainty of the measured mean.
     closed : whether the cycle repeats.
-    guard : positions that will be left out on each side.
+    guard : positions to leave out on each side.
     """
-    size, marked = len(value), np.zeros(len(value), bool)
-    if size < NEARBY or not bends.size:
-        return marked
     bend = np.nan_to_num(np.abs(np.roll(value, -1) - 2 * value + np.roll(value, 1)))
     if not closed:
         bend[[0, -1]] = 0.0
     usual = median_filter(bend, NEARBY, mode="wrap" if closed else "nearest")
-    order = np.argsort(phase)
-    before = np.unique(np.searchsorted(phase[order], bends + 1e-9, side="right") - 1)  # a bend at a position is after
-    if not closed:
-        before = before[(before >= 0) & (before < size - 1)]
-    pairs = order[np.stack([before, before + 1]) % size]
-    level, peak = np.min(usual[pairs], axis=0), np.max(bend[pairs], axis=0)
-    off = ROUNDED * (peak - level) / np.maximum(np.min(uncertainty[pairs], axis=0), 1e-300)
-    off[(peak <= STANDS_OUT * level) | (off <= TOO_MUCH) | np.any(excluded[pairs], axis=0)] = 0.0
-    largest = np.argsort(-off)[: max(1, int(MOST * size / (2 * max(guard, 1))))]
-    marked[pairs[:, largest[off[largest] > 0]]] = True
-    return marked
+    off = ROUNDED * (bend - usual) / np.maximum(uncertainty, 1e-300)
+    off[(bend <= STANDS_OUT * usual) | (off <= TOO_MUCH)] = 0.0
+    for least in np.unique(off[off > 0]):
+        if np.mean(about := beside(off >= least, guard)) <= MOST:
+            return about
+    return np.zeros(len(value), bool)
+
+
+def beside(mask: Mask, guard: int) -> Mask:
+    """Positions that are fewer than so many beside one of a mask, over the end of the cycle too."""
+    return np.asarray(maximum_filter1d(mask, 2 * guard - 1, mode="wrap") if guard > 0 else np.zeros_like(mask))
 
 
 # ---- the search -----------------------------------------------------------------------------------------------
@@ -405,13 +364,13 @@ def refined(fit: Fit, start: Array) -> tuple[Fit, Solution]:
 
     On a limit a search would not get off.
     """
-    fit = replace(fit, variances=fit.first_scatter())
+    fit = replace(fit, variances=fit.scatter())
     fit = replace(fit, masks=fit.allowed(start))
     low, high = fit.bounds
     room = np.minimum(INSIDE * sizes_of(fit, start), 0.25 * (high - low))
     best = solved(fit, np.clip(start, low + room, high - room))
     for _ in range(ROUNDS):
-        other = replace(fit, variances=fit.learnt_scatter(best.x), masks=fit.allowed(best.x))
+        other = replace(fit, variances=fit.scatter(best.x), masks=fit.allowed(best.x))
         same = all(np.array_equal(a, b) for a, b in zip(other.masks, fit.masks, strict=True))
         if same and np.allclose(other.variances, fit.variances, rtol=SETTLED, atol=0.0, equal_nan=True):
             return fit, best._replace(settled=True)

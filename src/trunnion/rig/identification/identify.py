@@ -29,9 +29,9 @@ from trunnion.rig.comparison import data_findings, hashed_files, other_speed, wr
 from trunnion.rig.identification.fit import (
     FAR,
     Block,
-    Evaluations,
     Fit,
     Solution,
+    evaluations,
     refined,
     sensor_errors,
     shared_zero,
@@ -185,7 +185,7 @@ def identify(
 
     each(range(len(conditions)), check)
     errors = sensor_errors(model, conditions, blocks)
-    fit = Fit(Evaluations(model, progress or (lambda count: None)), blocks, errors, guard)
+    fit = Fit(model, evaluations(model, progress or (lambda count: None)), blocks, errors, guard)
     fit, best = refined(fit, _runnable(fit))
     spread = spread_of(fit, best.x)
     if spread.excess > 1 and fit.sensors:
@@ -201,7 +201,7 @@ def identify(
 def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: Sequence[str]) -> list[Block]:
     """One for each channel in each condition; all channels if none is named.
 
-    hold_out: conditions by name, by a setting or its value in it, or by file. MechanismError for what names none.
+    hold_out: conditions by name, by a setting in it, or by file. MechanismError for what names none.
     """
     conditions, held = measurement.conditions, set[int]()
     every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
@@ -210,11 +210,20 @@ def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: 
     if missing := [name for name in channels or () if name not in every]:
         remedy = f"the measurement has {', '.join(every)}"
         raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "channels", remedy))
+    names_of = []
+    for condition in conditions:  # spaces and signs of equality as one likes
+        files = [PurePath(file) for file in condition.files]
+        names = [
+            condition.name,
+            *condition.name.split(", "),
+            *(name for file in files for name in (file.name, file.stem)),
+        ]
+        names_of.append({re.sub(r"[\s=]", "", name) for name in names} - {""})
     for text in [hold_out] if isinstance(hold_out, str) else hold_out:
-        named = {k for k, condition in enumerate(conditions) if _plain(text) in _names(condition)}
+        named = {k for k, names in enumerate(names_of) if re.sub(r"[\s=]", "", text) in names}
         if not named:
-            names = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
-            remedy = f"name one of {names}{'; …' * (len(conditions) > MOST_NAMED)}; or a file, or NAME=VALUE"
+            listed = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
+            remedy = f"name one of {listed}{'; …' * (len(conditions) > MOST_NAMED)}; or a file, or NAME=VALUE"
             raise MechanismError(Finding(f"there is no condition '{text}'", "hold_out", remedy))
         held |= named
     if len(held) == len(conditions):
@@ -225,19 +234,6 @@ def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: 
             turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
             blocks.append(Block(k, channel, replace(signal, turns=turns), k in held))
     return blocks
-
-
-def _plain(text: str) -> str:
-    """A name or a setting, NAME=VALUE or NAME VALUE, without what may be written otherwise."""
-    return re.sub(r"[\s=]", "", text)
-
-
-def _names(condition: Condition) -> set[str]:
-    """What a condition may be named by."""
-    files, settings = [PurePath(file) for file in condition.files], condition.name.split(", ")
-    values = [setting.partition(" ")[2] for setting in settings]
-    names = [condition.name, *settings, *values, *(file.name for file in files), *(file.stem for file in files)]
-    return {_plain(name) for name in names} - {""}
 
 
 def _with_settings(
@@ -284,12 +280,13 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
 
 def _acted_on(model: Model) -> dict[str, Measure]:
     """The channels that an unknown acts on, as far as the start shows; all if there are none."""
-    courses = model.courses(np.array([unknown.start for unknown in model.unknowns]))
+    courses = model.courses(model.start)
     sizes, moved = np.array([unknown.size or 1.0 for unknown in model.unknowns])[:, None], set[str]()
-    for name, course in (pair for row in courses.by_condition for pair in row.items()):
-        most = float(np.nanmax(np.abs(course.value), initial=0.0)) or 1.0
-        if np.nanmax(np.abs(np.nan_to_num(course.slope)) * sizes, initial=0.0) > NOTHING * most:
-            moved.add(name)
+    for row in courses:
+        for name, value in row.values.items():
+            most = float(np.nanmax(np.abs(value), initial=0.0)) or 1.0
+            if np.nanmax(np.abs(np.nan_to_num(row.slopes[name])) * sizes, initial=0.0) > NOTHING * most:
+                moved.add(name)
     return {name: measure for name, measure in model.measures.items() if not moved or name in moved}
 
 
@@ -298,15 +295,15 @@ def _runnable(fit: Fit) -> Array:
     rubs = [p for p, unknown in enumerate(fit.model.unknowns) if any(".friction." in path for path in unknown.paths)]
     starts, lost = [fit.start], list[int]()
     for k in range(HALVINGS + 1):
-        lost.append(sum(int(np.sum(codes >= Status.NOT_CONVERGED)) for codes in fit.courses(starts[-1]).status))
+        lost.append(sum(int(np.sum(row.status >= Status.NOT_CONVERGED)) for row in fit.courses(starts[-1])))
         if not (lost[-1] and rubs):
             break
         starts.append(fit.start.copy())
         starts[-1][rubs] = np.maximum(fit.start[rubs] * 0.5 ** (k + 1), fit.bounds[0][rubs])
     best = starts[int(np.argmin(lost))]
-    masks = replace(fit, variances=fit.first_scatter()).allowed(best)
+    masks = replace(fit, variances=fit.scatter()).allowed(best)
     if not any(np.any(masks[k]) for k in fit.fitted):
-        codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
+        codes = np.concatenate([row.status for row in fit.courses(best)])
         what = "no position can be used: no channel has a value there, friction reverses beside it, or the model has "
         what += f"no sound answer (most often {list(Status)[int(np.bincount(codes).argmax())].text})"
         remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
@@ -495,7 +492,7 @@ class _Identified:
             "data_findings": data_findings(measurement),
             "done": list(measurement.done),
             "inputs": inputs(mechanism),
-            "evaluations": fit.courses_at.count,
+            "evaluations": fit.evaluate.cache_info().misses,
             "converged": int(self.solution.converged),
             "references": "\n".join([*SOURCES, *references(mechanism)]),
             "findings": finding_rows(self.findings()),

@@ -6,7 +6,7 @@ All conditions and unknowns are one batch: row c·P + p of it is condition c wit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import inf, nan
 from typing import NamedTuple
@@ -23,26 +23,19 @@ from trunnion.model.parameters import measured
 from trunnion.model.rules import Within
 from trunnion.rig.modelled import turned
 from trunnion.solve import shifts
-from trunnion.solve.forward import posed
+from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.status import pose_status, status_of
-from trunnion.solve.switches import Mechanisms, bends
 
-__all__ = ["Course", "Courses", "DriveCycle", "Model", "Parameters", "Unknown", "limits", "paths_of", "unknowns"]
+__all__ = ["Courses", "DriveCycle", "Model", "Parameters", "Unknown", "limits", "paths_of", "unknowns"]
 
 Array = NDArray[np.float64]
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
 AT_ONCE = 20_000  # numbers in an array
 STEP = 1e-6  # of a number, for what it does to the duration of the cycle
 SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
-
-
-class Course(NamedTuple):
-    """One channel in one condition: values (position,) and their derivatives (unknown, position)."""
-
-    value: Array
-    slope: Array
 
 
 class DriveCycle(NamedTuple):
@@ -62,15 +55,16 @@ class DriveCycle(NamedTuple):
 
 
 class Courses(NamedTuple):
-    """All that the model has at some values of the unknowns.
+    """What the model has in one condition at some values of the unknowns.
 
-    by_condition: by channel; status: of the positions, by condition; turned: where the sense of a friction or
-    of a resisting load changes from one position to the next, by condition.
+    values: by channel, (position,); slopes: their derivatives, (unknown, position); status: of the positions; turned:
+    where the sense of a friction or of a resisting load changes from one position to the next.
     """
 
-    by_condition: tuple[Mapping[str, Course], ...]
-    status: tuple[NDArray[np.int8], ...]
-    turned: tuple[NDArray[np.bool_], ...]
+    values: Mapping[str, Array]
+    slopes: Mapping[str, Array]
+    status: NDArray[np.int8]
+    turned: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -108,37 +102,35 @@ class Model:
     phases: tuple[Array, ...]
     friction: FrictionMethod
 
-    def courses(self, at: Array) -> Courses:
-        """What the model says at these values of the unknowns, SI."""
-        rows: dict[int, tuple[Mapping[str, Course], NDArray[np.int8], NDArray[np.bool_]]] = {}
+    def courses(self, at: Array) -> list[Courses]:
+        """What the model says in each condition at these values of the unknowns, SI."""
+        rows: dict[int, Courses] = {}
         many, sizes = len(self.unknowns), [len(phase) for phase in self.phases]
         for size in dict.fromkeys(sizes):  # conditions with as many positions as each other, not too many at once
             alike = [k for k, item in enumerate(sizes) if item == size]
             most = max(1, AT_ONCE // (size * many))
             for part in (alike[low : low + most] for low in range(0, len(alike), most)):
                 shape = (len(part) * many, size)
-                courses, status, sides = self._batch(part, at, shape)
-                parts = {name: [np.broadcast_to(np.asarray(of(signal), float), shape) for of in (primal, derivative)]
-                         for name, signal in courses.items()}  # fmt: skip
+                values, time = self._values(part, at), self._times(part, at)
+                solved: Forward | Backward
+                with np.errstate(all="ignore"):
+                    if all(measure.of_motion for measure in self.measures.values()):
+                        solved = posed(self.run.system, values, self.run.chosen.assembly, time)
+                        status, sides = pose_status(solved, shape), np.zeros(shape, bool)
+                    else:
+                        solved = self.run.solve(time, values, self.friction)
+                        status, sides = status_of(solved, shape), turned(self.run, solved.walk, shape)
+                    curves = {name: measure.curve(solved)[0] for name, measure in self.measures.items()}
+                reals, slopes = ({name: np.broadcast_to(np.asarray(of(curve), float), shape)
+                                  for name, curve in curves.items()} for of in (primal, derivative))  # fmt: skip
                 for i, k in enumerate(part):
                     lanes = slice(i * many, (i + 1) * many)
-                    by_channel = {name: Course(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
-                    rows[k] = by_channel, np.max(status[lanes], axis=0), np.any(sides[lanes], axis=0)
-        return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
-
-    def _batch(
-        self, part: Sequence[int], at: Array, shape: tuple[int, int]
-    ) -> tuple[dict[str, Number], NDArray[np.int8], NDArray[np.bool_]]:
-        """Courses by channel, statuses and where a sense changes, of conditions with as many positions."""
-        values, time = self._values(part, at), self._times(part, at)
-        with np.errstate(all="ignore"):
-            if all(measure.of_motion for measure in self.measures.values()):
-                walk = posed(self.run.system, values, self.run.chosen.assembly, time)
-                courses = {name: measure.curve(walk)[0] for name, measure in self.measures.items()}
-                return courses, pose_status(walk, shape), np.zeros(shape, bool)
-            back = self.run.solve(time, values, self.friction)
-            courses = {name: measure.curve(back)[0] for name, measure in self.measures.items()}
-            return courses, status_of(back, shape), turned(self.run, back.walk, shape)
+                    rows[k] = Courses(
+                        {name: course[i * many] for name, course in reals.items()},
+                        {name: course[lanes] for name, course in slopes.items()},
+                        np.max(status[lanes], axis=0), np.any(sides[lanes], axis=0),
+                    )  # fmt: skip
+        return [rows[k] for k in range(len(self.phases))]
 
     def by_share(self, condition: int, row: Array) -> Array:
         """Derivative by the share of the cycle of courses in a condition, (…, position), by differences of neighbours.
@@ -153,33 +145,22 @@ class Model:
         gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
         return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / gap)
 
-    @cached_property
-    def _start(self) -> Array:
+    @property
+    def start(self) -> Array:
+        """Where the unknowns start, SI."""
         return np.array([unknown.start for unknown in self.unknowns])
 
     @cached_property
-    def cycles(self) -> tuple[DriveCycle, ...]:
+    def cycles(self) -> list[DriveCycle]:
         """The cycle in every condition, with the unknowns at their start."""
-        return tuple(self.cycle(k, self._start) for k in range(len(self.phases)))
-
-    @cached_property
-    def bends(self) -> tuple[Array, ...]:
-        """Shares of the cycle at which forces may bend or jump, by condition, with the unknowns at their start.
-
-        Points of load tables, ends of `between`, springs that let go, motion laws; see `switches`.
-        """
-        places = []
-        for k, (duration, *_) in enumerate(self.cycles):
-            values = self.run.system.mechanism.parameters(self._overrides(k, self._start))
-            cycle = replace(self.run.cycle, duration=duration)
-            times = bends(Mechanisms(self.run.system, self.run.chosen.assembly, values, [cycle]))[0]
-            places.append(times / (duration or 1.0))
-        return tuple(places)
+        return [self.cycle(k, self.start) for k in range(len(self.phases))]
 
     def cycle(self, condition: int, at: Array) -> DriveCycle:
         """The cycle at some values of the unknowns. Gear pairs that no driver turns are taken to turn as nominally."""
         system, cycle = self.run.system, self.run.cycle
-        values = system.mechanism.parameters(self._overrides(condition, at))
+        pairs = zip(at, self.unknowns, strict=True)
+        sought = {path: float(value) for value, unknown in pairs for path in unknown.paths}
+        values = system.mechanism.parameters({**self.settings[condition], **sought})
         if cycle.duration == 0:
             return DriveCycle(0.0, nan, nan)
         duration = float(cycle.duration * system.cycle(values).duration / system.cycle(self.run.values).duration)
@@ -211,34 +192,24 @@ class Model:
                 values.update(play.model.paths(f"seats.{seat.joint}", shifts.given_offsets(values, seat.joint, play)))
         return values
 
-    def _overrides(self, condition: int, at: Array) -> dict[str, float]:
-        """What a condition sets, and the unknowns."""
-        pairs = zip(at, self.unknowns, strict=True)
-        sought = {path: float(value) for value, unknown in pairs for path in unknown.paths}
-        return {**self.settings[condition], **sought}
-
-    @cached_property
-    def _timing(self) -> tuple[int, ...]:
-        """Unknowns that make the cycle longer or shorter."""
-        places = range(len(self.unknowns))
-        return tuple(p for p in places if self.cycle(0, self._moved(self._start, p, 1e3))[0] != self.cycles[0][0])
-
-    def _moved(self, at: Array, p: int, steps: float) -> Array:
-        return np.asarray(at + steps * STEP * (abs(at[p]) or 1.0) * (np.arange(len(at)) == p))
-
     def _times(self, part: Sequence[int], at: Array) -> Number:
         """Times of the positions, s, (row, position): shares of a cycle that an unknown may make longer."""
         many = len(self.unknowns)
         phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
-        if not self._timing:
-            return phase * np.repeat([self.cycles[k].duration for k in part], many)[:, None]
-        duration = np.repeat([self.cycle(k, at).duration for k in part], many)[:, None]
-        slope = np.zeros_like(duration)
-        for i, k in enumerate(part):
-            for p in self._timing:
-                low, high = (self.cycle(k, self._moved(at, p, sign)).duration for sign in (-1.0, 1.0))
-                slope[i * many + p] = (high - low) / (2 * STEP * (abs(at[p]) or 1.0))
-        return Dual(phase * duration, phase * slope)
+        duration, slope = np.array([self.cycle(k, at).duration for k in part]), np.zeros((len(part), many))
+        for p in self._timing:
+            step = STEP * (abs(at[p]) or 1.0) * (np.arange(many) == p)
+            ends = [[self.cycle(k, at + sign * step).duration for k in part] for sign in (-1, 1)]
+            slope[:, p] = np.diff(ends, axis=0)[0] / (2 * step[p])
+        time = phase * np.repeat(duration, many)[:, None]
+        return Dual(time, phase * slope.reshape(-1, 1)) if self._timing else time
+
+    @cached_property
+    def _timing(self) -> list[int]:
+        """Unknowns that make the cycle longer or shorter."""
+        start, places = self.start, range(len(self.unknowns))
+        moved = [start + 1e3 * STEP * (abs(start[p]) or 1.0) * (np.arange(len(start)) == p) for p in places]
+        return [p for p in places if self.cycle(0, moved[p]).duration != self.cycles[0].duration]
 
 
 # ---- unknowns --------------------------------------------------------------------------------------------------

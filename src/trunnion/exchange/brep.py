@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize_scalar
 
-from trunnion.exchange.draft import Array, steiner
+from trunnion.exchange.draft import Array, Place, perpendicular, refused, steiner
 from trunnion.exchange.part21 import Part21
 
 __all__ = ["Face", "Geometry", "Moments", "Solid"]
@@ -33,7 +33,7 @@ KINDS = {
     "SPHERICAL_SURFACE": "sphere",
     "TOROIDAL_SURFACE": "torus",
 }
-WRAPPED = ("SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE")
+WRAPPED = ("SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "TRIMMED_CURVE")
 
 
 class UnreadError(Exception):
@@ -54,13 +54,14 @@ class Moments:
     def __mul__(self, factor: float) -> Moments:
         return Moments(factor * self.volume, factor * self.first, factor * self.second)
 
-    def placed(self, matrix: Array, shift: Array) -> Moments:
-        """Of the same body at matrix · q + shift; the matrix may scale and mirror."""
+    def at(self, place: Place) -> Moments:
+        """Of the same body at another place."""
+        matrix, shift = place.matrix, place.shift
         grown = abs(float(np.linalg.det(matrix)))
         first, second = matrix @ self.first, matrix @ self.second @ matrix.T
         cross = np.outer(first, shift)
-        whole_shift = self.volume * np.outer(shift, shift)
-        return Moments(self.volume, first + self.volume * shift, second + cross + cross.T + whole_shift) * grown
+        second = second + cross + cross.T + self.volume * np.outer(shift, shift)
+        return Moments(self.volume, first + self.volume * shift, second) * grown
 
     @property
     def centre(self) -> Array:
@@ -141,7 +142,7 @@ class Geometry:
         values = np.array([*self.file.args(number, "DIRECTION")[1], 0.0][:3], dtype=float)
         size = float(np.linalg.norm(values))
         if not size > 0:
-            raise self.file.unreadable(f"has a direction without length at #{number}")
+            raise refused(f"has a direction without length at #{number}")
         return values / size
 
     def placement(self, number: Any) -> tuple[Array, Array]:
@@ -151,8 +152,7 @@ class Geometry:
         x = np.array([1.0, 0.0, 0.0]) if reference is None else self.direction(reference)
         x = x - (x @ z) * z
         if np.linalg.norm(x) < 1e-9:  # the standard lets a reader choose x where the file's is along the axis
-            x = np.eye(3)[int(np.argmin(abs(z)))]
-            x = x - (x @ z) * z
+            x = perpendicular(z)
         x /= np.linalg.norm(x)
         return np.array([x, np.cross(z, x), z]), self.point(location)
 
@@ -174,8 +174,6 @@ class Geometry:
         kind = self.file.kind(curve)
         if kind in WRAPPED:
             return self._nodes(entity[kind][1], ends, closed, same)
-        if kind == "TRIMMED_CURVE":
-            return self._nodes(entity[kind][1], ends, closed, same)
         if kind == "LINE":
             return _segment(ends[0], ends[1])
         if "B_SPLINE_CURVE_WITH_KNOTS" in entity:
@@ -188,7 +186,7 @@ class Geometry:
 
         def parameter(point: Array) -> float:
             x, y = frame[0] @ (point - centre) / a, frame[1] @ (point - centre) / b
-            return float(np.arctan2(y, x)) if sizes and kind in ("CIRCLE", "ELLIPSE") else _open_parameter(kind, y)
+            return float({"HYPERBOLA": np.arcsinh(y), "PARABOLA": y}.get(kind, np.arctan2(y, x)))
 
         first, last = parameter(ends[0]), parameter(ends[1])
         if kind in ("CIRCLE", "ELLIPSE"):
@@ -302,7 +300,7 @@ class Geometry:
         """Add a face and its share of the moments to a solid."""
         kind = self.file.kind(number)
         if kind not in ("ADVANCED_FACE", "FACE_SURFACE"):
-            raise self.file.unreadable(f"has {kind} at #{number} where a face belongs")
+            raise refused(f"has {kind} at #{number} where a face belongs")
         _, bounds, surface, same = self.file[number][kind][:4]
         face = self.surface(surface, bool(same) == along, int(number))
         loops, points = [], []
@@ -333,10 +331,6 @@ class Geometry:
         if not face.area > 0:
             solid.doubts.append("it has faces whose bounds run the wrong way round")
         solid.moments = solid.moments + moments
-
-
-def _open_parameter(kind: str, y: float) -> float:
-    return float(np.arcsinh(y)) if kind == "HYPERBOLA" else float(y)
 
 
 def _segment(start: Array, end: Array) -> tuple[Array, Array]:
@@ -428,8 +422,7 @@ def _pole_free(face: Face, loops: list[tuple[Array, Array]]) -> Array:
     axes = np.random.default_rng(0).normal(size=(64, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     axis = axes[int(np.argmin(abs(places @ axes.T).max(axis=0)))]
-    x = np.cross(axis, np.eye(3)[int(np.argmin(abs(axis)))])
-    x /= np.linalg.norm(x)
+    x = perpendicular(axis)
     return np.array([x, np.cross(axis, x), axis])
 
 

@@ -8,19 +8,60 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from itertools import count
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 
-__all__ = ["Array", "Body", "Draft", "Pair", "about", "free_name", "moved", "perpendicular", "steiner", "united"]
+if TYPE_CHECKING:
+    from trunnion.exchange.formats import ImportOptions
+
+__all__ = ["Array", "Body", "Draft", "Pair", "Place", "components", "few", "free_name", "moved", "perpendicular",
+           "refused", "steiner", "united"]  # fmt: skip
 
 Array = NDArray[np.float64]
 FARTHEST = 1e9  # m; what lies farther is a mistake of the file
 PARALLEL = 1e-6  # rad, between axes that count as parallel
+
+
+def refused(what: str, where: str = "", remedy: str = "mend the file, or export it again") -> MechanismError:
+    """What forbids to read a file, to be raised; `import_file` adds which file."""
+    return MechanismError(Finding(what, where, remedy))
+
+
+def few(number: int, most: int, noun: str) -> None:
+    """Refuse a file that holds more than a mechanism needs, before it fills the memory."""
+    if number > most:
+        raise refused(f"has {number:,} {noun}; at most {most:,} are read", remedy="export the mechanism alone")
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A frame in another one: matrix · q + shift, m; the matrix is a rotation, and may mirror and scale a part."""
+
+    matrix: Array = field(default_factory=lambda: np.asarray(np.eye(3)))
+    shift: Array = field(default_factory=lambda: np.zeros(3))
+
+    def __matmul__(self, inner: Place) -> Place:
+        return Place(self.matrix @ inner.matrix, self.at(inner.shift))
+
+    def at(self, point: Array) -> Array:
+        """A point of the frame in the other one."""
+        return np.asarray(self.matrix @ point + self.shift)
+
+    def inertia(self, tensor: Array) -> Array:
+        """A tensor of the frame in the axes of the other one."""
+        return np.asarray(self.matrix @ tensor @ self.matrix.T)
+
+    @property
+    def inverse(self) -> Place:
+        """The other frame in this one."""
+        matrix = np.asarray(np.linalg.inv(self.matrix), dtype=float)
+        return Place(matrix, -matrix @ self.shift)
 
 
 @dataclass
@@ -128,13 +169,18 @@ class Draft:
 
     def warn(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
         """Note a doubt; code: of the list in the manual, `exchange.…`."""
-        weighed = Finding.weighed(Severity.WARNING, code, where, what, remedy, **figures)
-        self.findings.append(weighed)
+        self.findings.append(Finding.warning(code, where, what, remedy, **figures))
 
     def note(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
         """Note something that is lost or assumed."""
-        weighed = Finding.weighed(Severity.NOTE, code, where, what, remedy, **figures)
-        self.findings.append(weighed)
+        self.findings.append(Finding.note(code, where, what, remedy, **figures))
+
+    def assumed_unit(self, options: ImportOptions) -> float:
+        """The length unit of a file that states none, m; a doubt unless the user states it."""
+        if not options.unit_stated:
+            what = f"states no unit of length: {1e3 * options.unit:.6g} mm is taken for 1"
+            self.warn("exchange.unit", "file", what, "state it with --unit")
+        return options.unit
 
     def pairs_of(self, body: str) -> list[Pair]:
         """The pairs that a body takes part in."""
@@ -147,32 +193,24 @@ class Draft:
 
     def welded(self) -> Draft:
         """The same with bodies that fixed pairs join made one; the ground, else the first, gives its name."""
-        leader = {name: name for name in self.bodies}
-
-        def first(name: str) -> str:
-            while leader[name] != name:
-                name = leader[name]
-            return name
-
-        for pair in (pair for pair in self.pairs.values() if pair.type == "fixed"):
-            one_end, other = first(pair.links[0]), first(pair.links[1])
-            if other == first(self.ground) if self.ground else False:
-                one_end, other = other, one_end
-            leader[other] = one_end
+        leader = self.leaders()
         bodies: dict[str, Body] = {}
         for name, body in self.bodies.items():
-            lead = first(name)
-            bodies[lead] = body if lead not in bodies else united(bodies[lead], body, lead)
-            if lead != name or bodies[lead].name != lead:
-                bodies[lead] = replace(bodies[lead], name=lead)
-        pairs = {}
-        for name, pair in self.pairs.items():
-            links = first(pair.links[0]), first(pair.links[1])
-            if pair.type != "fixed" and links[0] != links[1]:
-                pairs[name] = replace(pair, links=links)
-        ground = first(self.ground) if self.ground else ""
+            lead = leader[name]
+            bodies[lead] = united(bodies[lead], body, lead) if lead in bodies else replace(body, name=lead)
+        pairs = {
+            name: replace(pair, links=(leader[pair.links[0]], leader[pair.links[1]]))
+            for name, pair in self.pairs.items()
+            if leader[pair.links[0]] != leader[pair.links[1]]
+        }
         drives = {name: rate for name, rate in self.drives.items() if name in pairs}
-        return replace(self, bodies=bodies, pairs=pairs, ground=ground, drives=drives)
+        return replace(self, bodies=bodies, pairs=pairs, drives=drives)
+
+    def leaders(self) -> dict[str, str]:
+        """Of each body the one that stands for all that fixed pairs join it to: the ground, else the first of them."""
+        groups = components(self.bodies, [pair.links for pair in self.pairs.values() if pair.type == "fixed"])
+        order = (self.ground, *self.bodies)
+        return {name: next(lead for lead in order if lead in group) for group in groups for name in group}
 
     def plane_normal(self) -> Array | None:
         """The normal of the plane that all bodies move in parallel to; None if there is none.
@@ -180,57 +218,59 @@ class Draft:
         Axes of turning pairs are parallel to it, slides of prismatic pairs normal to it. Balls are pins of the plane
         where the mechanism could not move otherwise, as in a loop that a format closes by a point.
         """
-        turning = [pair.axis for pair in self.pairs.values() if pair.type in ("revolute", "cylindrical", "planar")]
-        sliding = [pair.axis for pair in self.pairs.values() if pair.type == "prismatic"]
         if self.plane:
             return np.array([0.0, 0.0, 1.0])
+        axes = {name: pair.axis / np.linalg.norm(pair.axis) for name, pair in self.pairs.items()}
+        turning = [
+            axes[pair.name] for pair in self.pairs.values() if pair.type in ("revolute", "cylindrical", "planar")
+        ]
+        sliding = [axes[pair.name] for pair in self.pairs.values() if pair.type == "prismatic"]
         types = {pair.type for pair in self.pairs.values()}
-        if types & {"universal", "helical"} or not types or ("spherical" in types and self.mobility() > 0):
+        if types & {"universal", "helical"} or ("spherical" in types and self.mobility() > 0):
             return None
-        if turning:
-            normal = turning[0] / np.linalg.norm(turning[0])
-        elif len(sliding) > 1:
-            normal = np.cross(sliding[0], sliding[1])
-            if np.linalg.norm(normal) < PARALLEL:
-                return None
-            normal = normal / np.linalg.norm(normal)
-        else:
+        normals = turning or [np.cross(sliding[0], sliding[1])] if turning or len(sliding) > 1 else []
+        if not normals or np.linalg.norm(normals[0]) < PARALLEL:
             return None
-        for axis in turning:
-            if np.linalg.norm(np.cross(axis, normal)) > PARALLEL * np.linalg.norm(axis):
-                return None
-        for axis in sliding:
-            if abs(axis @ normal) > PARALLEL * np.linalg.norm(axis):
-                return None
-        largest = int(np.argmax(abs(normal)))
-        return np.asarray(normal * np.sign(normal[largest]), dtype=float)
+        normal = normals[0] / np.linalg.norm(normals[0])
+        if any(np.linalg.norm(np.cross(axis, normal)) > PARALLEL for axis in turning):
+            return None
+        if any(abs(axis @ normal) > PARALLEL for axis in sliding):
+            return None
+        return np.asarray(normal * np.sign(normal[int(np.argmax(abs(normal)))]), dtype=float)
 
     def checked(self) -> Draft:
         """The same, with a finding of all that is left out; MechanismError if a body or pair is none of a mechanism."""
-        findings = []
+        faults = []
         if self.lost:
             named = {what: ", ".join(names[:10]) + " …" * (len(names) > 10) for what, names in self.lost.items()}
             all_lost = "; ".join(f"{what} ({names})" if names else what for what, names in named.items())
             self.note("exchange.lost", "", f"is read without {all_lost}", "add to the model what moves or loads it")
-        for pair in self.pairs.values():
-            if pair.type not in PAIRS:
-                findings.append(Finding(f"has the type {pair.type!r}, which is no pair", f"joints.{pair.name}"))
+        for name, pair in self.pairs.items():
             numbers = np.concatenate([pair.at, pair.axis])
             if not np.abs(pair.at).max() < FARTHEST:
-                what = f"lies {np.abs(pair.at).max():.3g} m away"
-                findings.append(Finding(what, f"joints.{pair.name}", "mend the file"))
+                faults.append((f"joints.{name}", f"lies {np.abs(pair.at).max():.3g} m away"))
             if not np.isfinite(numbers).all() or not np.linalg.norm(pair.axis) > 0:
-                findings.append(Finding("has no place or no axis", f"joints.{pair.name}", "mend the file"))
+                faults.append((f"joints.{name}", "has no place or no axis"))
             strange = [link for link in pair.links if link not in self.bodies]
-            findings += [Finding(f"joins {link!r}, which it does not have", f"joints.{pair.name}") for link in strange]
-        for body in self.bodies.values():
+            faults += [(f"joints.{name}", f"joins {link!r}, which it does not have") for link in strange]
+        for name, body in self.bodies.items():
             if not (np.isfinite(body.mass) and np.isfinite(body.centre).all() and np.isfinite(body.inertia).all()):
-                findings.append(Finding("has a mass, centre or inertia that is no number", f"links.{body.name}"))
+                faults.append((f"links.{name}", "has a mass, centre or inertia that is no number"))
             if body.mass < 0:
-                findings.append(Finding(f"has the mass {body.mass:g} kg", f"links.{body.name}", "mend the file"))
-        if findings:
-            raise MechanismError([replace(finding, file=self.source) for finding in findings])
+                faults.append((f"links.{name}", f"has the mass {body.mass:g} kg"))
+        if faults:
+            raise MechanismError([Finding(what, where, "mend the file", file=self.source) for where, what in faults])
         return self
+
+
+def components(names: Iterable[str], links: Iterable[tuple[str, str]]) -> list[set[str]]:
+    """The groups of names that links join, in the order of their first names."""
+    groups = {name: {name} for name in names}
+    for left, other in links:
+        if groups[left] is not groups[other]:
+            both = groups[left] | groups[other]
+            groups.update(dict.fromkeys(both, both))
+    return list({id(group): group for group in groups.values()}.values())
 
 
 def united(first: Body, other: Body, name: str) -> Body:
@@ -238,9 +278,8 @@ def united(first: Body, other: Body, name: str) -> Body:
     mass = first.mass + other.mass
     centre = (first.mass * first.centre + other.mass * other.centre) / mass if mass else first.centre
     inertia = sum(body.inertia + body.mass * steiner(body.centre - centre) for body in (first, other))
-    return Body(
-        name, mass, centre, np.asarray(inertia), {**first.points, **other.points}, [*first.comments, *other.comments]
-    )
+    comments = [*first.comments, *other.comments]
+    return Body(name, mass, centre, np.asarray(inertia), first.points | other.points, comments)
 
 
 def steiner(offset: Array) -> Array:
@@ -248,36 +287,22 @@ def steiner(offset: Array) -> Array:
     return np.asarray(offset @ offset * np.eye(3) - np.outer(offset, offset))
 
 
-def about(body: Body, point: Array) -> Array:
-    """The inertia of a body about a point, kg m² (3, 3)."""
-    return body.inertia + body.mass * steiner(point - body.centre)
-
-
 def moved(draft: Draft, rotation: Array, shift: Array) -> Draft:
     """The whole draft turned by a rotation matrix about the origin, then shifted."""
 
-    def place(point: Array) -> Array:
-        return rotation @ point + shift
+    def body(old: Body) -> Body:
+        points = {name: rotation @ place + shift for name, place in old.points.items()}
+        inertia = rotation @ old.inertia @ rotation.T
+        return replace(old, centre=rotation @ old.centre + shift, inertia=inertia, points=points)
 
-    bodies = {
-        name: replace(
-            body,
-            centre=place(body.centre),
-            inertia=rotation @ body.inertia @ rotation.T,
-            points={key: place(point) for key, point in body.points.items()},
-        )
-        for name, body in draft.bodies.items()
-    }
-    pairs = {
-        name: replace(
-            pair,
-            at=place(pair.at),
-            axis=rotation @ pair.axis,
-            second_axis=None if pair.second_axis is None else rotation @ pair.second_axis,
-            elements={link: (place(at), rotation @ axis) for link, (at, axis) in pair.elements.items()},
-        )
-        for name, pair in draft.pairs.items()
-    }
+    def pair(old: Pair) -> Pair:
+        second = None if old.second_axis is None else rotation @ old.second_axis
+        elements = {link: (rotation @ at + shift, rotation @ axis) for link, (at, axis) in old.elements.items()}
+        at, axis = rotation @ old.at + shift, rotation @ old.axis
+        return replace(old, at=at, axis=axis, second_axis=second, elements=elements)
+
+    bodies = {name: body(old) for name, old in draft.bodies.items()}
+    pairs = {name: pair(old) for name, old in draft.pairs.items()}
     gravity = None if draft.gravity is None else rotation @ draft.gravity
     return replace(draft, bodies=bodies, pairs=pairs, gravity=gravity)
 
@@ -293,11 +318,6 @@ def perpendicular(axis: Array) -> Array:
 def free_name(text: str, used: Iterable[str], default: str = "part") -> str:
     """A name that a model file accepts and that is not taken yet: short, printable, without a dot."""
     name = "".join(sign for sign in text.replace(".", "-") if sign.isprintable()).strip().lstrip("=+-@ ")[:40].strip()
-    name = name or default
-    used = set(used)
-    if name not in used:
-        return name
-    number = 2
-    while f"{name}-{number}" in used:
-        number += 1
-    return f"{name}-{number}"
+    name, used = name or default, set(used)
+    numbered = (f"{name}-{number}" for number in count(2))
+    return name if name not in used else next(other for other in numbered if other not in used)

@@ -7,8 +7,6 @@ an entry here. One with `write_moved(positions, path, original)` also moves the 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -17,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Draft
+from trunnion.exchange.draft import Draft, few, refused
 from trunnion.exchange.model_file import complete
 from trunnion.exchange.skeleton import positions_of
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS, Kind, UnitError
+from trunnion.model.units import KINDS, UnitError
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -57,10 +55,10 @@ FORMATS: dict[str, Format] = {
     ".3mf": Format("3MF", "mesh"),
     ".glb": Format("glTF", "mesh", "glb"),
     ".fcstd": Format("FreeCAD", "freecad"),
-    ".pmks": Format("PMKS+", "pmks"),
-    ".url": Format("PMKS+", "pmks"),
-    ".txt": Format("PMKS+", "pmks"),
-    ".json": Format("pylinkage", "pylinkage"),
+    ".pmks": Format("PMKS+", "linkages"),
+    ".url": Format("PMKS+", "linkages"),
+    ".txt": Format("PMKS+", "linkages"),
+    ".json": Format("pylinkage", "linkages"),
     ".fmu": Format("FMU", writes="fmu"),
 }
 
@@ -86,42 +84,20 @@ class ImportOptions:
     unit_stated: bool = False
 
 
-def _format_of(path: Path, reads: bool) -> Format:
-    """The format of a file by its extension, `.xml` by its first element; MechanismError if there is none."""
+def _entry(path: Path, verb: str) -> tuple[Format, Any]:
+    """The format of a file by its extension, `.xml` by its first element, and the module that reads or writes it."""
     suffix = path.suffix.lower()
     if suffix == ".xml":
-        suffix = _xml_kind(path) if reads else ".mjcf"
+        text = path.read_bytes()[:65536] if verb == "reads" else b""
+        roots = {b"<robot": ".urdf", b"<sdf": ".sdf"}
+        suffix = next((ending for root, ending in roots.items() if root in text and b"<mujoco" not in text), ".mjcf")
     entry = FORMATS.get(suffix)
-    possible = ", ".join(ending for ending, kind in FORMATS.items() if (kind.reads if reads else kind.writes))
-    if entry is None or not (entry.reads if reads else entry.writes):
-        what = f"has the extension {path.suffix or '(none)'!r}, which is not {'read' if reads else 'written'} here"
-        raise MechanismError(Finding(what, file=str(path), remedy=f"use one of {possible}"))
-    return entry
-
-
-def _xml_kind(path: Path) -> str:
-    """The format of an `.xml` file by the name of its first element."""
-    with _readable(path), path.open("rb") as stream:
-        text = stream.read(65536)
-    for root, suffix in ((b"<mujoco", ".mjcf"), (b"<robot", ".urdf"), (b"<sdf", ".sdf")):
-        if root in text:
-            return suffix
-    return ".mjcf"
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    """What the system refuses is a finding about the file."""
+    if entry is None or not getattr(entry, verb):
+        what = f"has the extension {path.suffix or '(none)'!r}, which is not {'read' if verb == 'reads' else 'written'}"
+        possible = ", ".join(ending for ending, kind in FORMATS.items() if getattr(kind, verb))
+        raise MechanismError(Finding(f"{what} here", file=str(path), remedy=f"use one of {possible}"))
     try:
-        yield
-    except OSError as error:
-        raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
-
-
-def _module(entry: Format, name: str, path: Path) -> Any:
-    """A module of a format; MechanismError that names the extra if a library is missing."""
-    try:
-        return import_module(f"trunnion.exchange.{name}")
+        return entry, import_module(f"trunnion.exchange.{getattr(entry, verb)}")
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("trunnion"):
             raise
@@ -159,52 +135,45 @@ def import_file(
     MechanismError : with the file and what is wrong with it.
     """
     path = Path(path)
-    heaviness = _material(material) if density is None else _number(density, "density", KINDS["density"])
-    largest, length = _number(gap, "gap", KINDS["length"]), _number(f"1 {unit}", "unit", KINDS["length"])
-    options = ImportOptions(ground, heaviness, largest, drive, length, unit != "mm")
-    rate, turns = _speed(speed)
-    if str(path).startswith(LINKS):
-        draft = import_module("trunnion.exchange.pmks").read_link(str(path), options)
-    else:
-        draft = _read(path, options)
+    if density is None and material not in MATERIALS:
+        remedy = nearest(material, MATERIALS)
+        raise MechanismError(Finding(f"{material!r} is no material of the table", "material", remedy))
+    heaviness = MATERIALS[material] if density is None else _number(density, "density", "density")
+    length = _number(f"1 {unit}", "unit", "length")
+    options = ImportOptions(ground, heaviness, _number(gap, "gap", "length"), drive, length, unit != "mm")
+    rate, turns = None, None  # whether it is the speed of a joint that turns; a plain number may be either
+    if speed != "":
+        try:
+            rate = _number(speed, "speed", "angular speed")
+            turns = None if isinstance(speed, (int, float)) else True
+        except MechanismError:
+            rate, turns = _number(speed, "speed", "speed"), False
+    try:
+        if str(path).startswith(LINKS):
+            draft: Draft = import_module("trunnion.exchange.linkages").read_link(str(path))
+        else:
+            reading(path)
+            _, module = _entry(path, "reads")
+            size = path.stat().st_size
+            if not size:
+                raise refused("is empty")
+            few(size, LARGEST, "bytes")
+            draft = module.read(path, options)
+    except MechanismError as error:
+        raise MechanismError([replace(finding, file=finding.file or str(path)) for finding in error.findings]) from None
+    except OSError as error:
+        raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
+    except (RecursionError, MemoryError):
+        raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
     draft.source = draft.source or path.name
     draft.name = draft.name or path.stem
     return complete(draft.checked(), ground, drive, rate, turns)
 
 
-def _read(path: Path, options: ImportOptions) -> Draft:
-    """The draft of a file."""
-    entry = _format_of(path, reads=True)
-    reading(path)
-    with _readable(path):
-        size = path.stat().st_size
-    if not size or size > LARGEST:
-        what = "is empty" if not size else f"has {size:,} bytes; at most {LARGEST:,} are read"
-        raise MechanismError(Finding(what, file=str(path), remedy="export the mechanism again, with fewer parts"))
-    module = _module(entry, entry.reads, path)
-    try:
-        with _readable(path):
-            draft: Draft = module.read(path, options)
-    except MechanismError as error:
-        raise MechanismError([replace(finding, file=finding.file or str(path)) for finding in error.findings]) from None
-    except (RecursionError, MemoryError):
-        raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
-    return draft
-
-
-def _speed(speed: str | float) -> tuple[float | None, bool | None]:
-    """A speed in SI, and whether it is one of a joint that turns; a plain number may be either."""
-    if speed == "":
-        return None, None
-    try:
-        rate = _number(speed, "speed", KINDS["angular speed"])
-    except MechanismError:
-        return _number(speed, "speed", KINDS["speed"]), False
-    return rate, None if isinstance(speed, (int, float)) else True
-
-
-def _number(value: str | float, name: str, kind: Kind) -> float:
-    """An option in SI, above 0."""
+def _number(value: str | float, name: str, quantity: str) -> float:
+    """An option in SI; all but the speed are above 0."""
+    kind = KINDS[quantity]
+    remedy = f"give a {kind.name} such as {kind.example}"
     try:
         plain = float(value)
     except ValueError:
@@ -213,18 +182,10 @@ def _number(value: str | float, name: str, kind: Kind) -> float:
         number = float(np.asarray(Quantity.read(plain, kind).evaluate()))
     except (UnitError, KeyError) as error:
         what = getattr(error, "what", f"'{value}' is no {kind.name}")
-        raise MechanismError(Finding(what, name, f"give a {kind.name} such as {kind.example}")) from None
+        raise MechanismError(Finding(what, name, remedy)) from None
     if not 0 < abs(number) < np.inf or (number < 0 and name != "speed"):
-        raise MechanismError(Finding(f"{value!r} is out of range", name, f"give a {kind.name} such as {kind.example}"))
+        raise MechanismError(Finding(f"{value!r} is out of range", name, remedy))
     return number
-
-
-def _material(name: str) -> float:
-    """The density of a material of the table, kg/m³."""
-    if name in MATERIALS:
-        return MATERIALS[name]
-    remedy = nearest(name, MATERIALS)
-    raise MechanismError(Finding(f"{name!r} is no material of the table", "material", remedy))
 
 
 def export_model(
@@ -255,26 +216,25 @@ def export_model(
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
     path = Path(path)
-    entry = _format_of(path, reads=False)
-    module = _module(entry, entry.writes, path)
-    moves = getattr(module, "MOVES", False)
+    entry, module = _entry(path, "writes")
     if magnify != 1 and not getattr(module, "MAGNIFIES", False):
         what = f"a model in {entry.name} has the mechanism's own places; they are not magnified"
         raise MechanismError(Finding(what, "--magnify", "leave it out, or write .step or .glb"))
     if not np.isfinite(magnify):
         raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
-    span = (frames, None) if moves else (FEWEST, at)
-    positions = positions_of(mechanism, *span, magnify=magnify)
-    if original is None:
-        with whole(path) as temporary:
-            findings: list[Finding] = module.write(positions, temporary)
-        return findings
-    if not hasattr(module, "write_moved"):
-        raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
-    source = Path(original)
-    reading(source)
-    with _readable(source):
-        source.open("rb").close()
+    moves = getattr(module, "MOVES", False)
+    positions = positions_of(mechanism, *((frames, None) if moves else (FEWEST, at)), magnify=magnify)
+    if original is not None:
+        if not hasattr(module, "write_moved"):
+            raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
+        reading(original)
+        try:
+            Path(original).open("rb").close()
+        except OSError as error:
+            raise MechanismError(Finding(f"cannot be read: {error.strerror}", file=str(original))) from None
     with whole(path) as temporary:
-        findings = module.write_moved(positions, temporary, source)
+        if original is None:
+            findings: list[Finding] = module.write(positions, temporary)
+        else:
+            findings = module.write_moved(positions, temporary, Path(original))
     return findings

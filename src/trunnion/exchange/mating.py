@@ -17,7 +17,7 @@ import numpy as np
 
 from trunnion.errors import MechanismError
 from trunnion.exchange.brep import Face
-from trunnion.exchange.draft import Array, Draft, Pair, free_name, perpendicular
+from trunnion.exchange.draft import Array, Draft, Pair, components, free_name, perpendicular
 from trunnion.joints.fits import fit, limits
 
 __all__ = ["joined"]
@@ -138,32 +138,6 @@ def _line_numbers(points: Sequence[Array], axes: Sequence[Array], slack: Sequenc
     return numbers
 
 
-class Groups:
-    """Bodies that move together: each by the name of the first of them."""
-
-    def __init__(self, draft: Draft) -> None:
-        self.draft, self.leader = draft, {name: name for name in draft.bodies}
-
-    def __call__(self, name: str) -> str:
-        while self.leader[name] != name:
-            name = self.leader[name]
-        return name
-
-    def weld(self, left: str, other: str, comment: str) -> None:
-        """Make two bodies one."""
-        first, second = self(left), self(other)
-        if second == self(self.draft.ground) if self.draft.ground else False:
-            first, second = second, first
-        self.leader[second] = first
-        name = free_name(f"fixed {left} {other}", self.draft.pairs)
-        self.draft.pairs[name] = Pair(name, "fixed", (first, second), np.zeros(3), comments=[comment])
-        self.draft.bodies[other].comments.append(comment)
-
-    def bodies(self) -> list[str]:
-        """The first of each group."""
-        return list(dict.fromkeys(self(name) for name in self.leader))
-
-
 def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
     """Add the pairs between the bodies of a draft, found by their faces.
 
@@ -172,16 +146,11 @@ def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
     draft : gets the pairs and the findings. faces : of every body, in the global frame.
     gap : greatest difference of the radii of a pin and its hole, and distance of facing planes, m.
     """
-    groups = Groups(draft)
-    rounds = {kind: _rounds(faces, kind) for kind in ("cylinder", "sphere")}
-    contacts = _contacts(draft, groups, rounds["cylinder"], gap)
-    balls = _contacts(draft, groups, rounds["sphere"], gap)
-    facings = list(_facings(faces, gap))
-    _slots(draft, faces, rounds["cylinder"], gap)
-    mechanism = _Held(draft, groups, contacts, balls, facings)
-    mechanism.patterns(rounds["cylinder"])
-    while mechanism.step():
-        pass
+    mechanism = _Contacts(draft, faces, gap)
+    for fixed in mechanism.bolted():
+        mechanism.weld(*fixed)
+    while (rigid := next(mechanism.rigid(), None)) is not None:
+        mechanism.weld(*rigid)
     mechanism.unconnected()
     mechanism.pairs()
 
@@ -222,36 +191,6 @@ def _rounds(faces: dict[str, list[Face]], kind: str) -> list[Round]:
     return rounds
 
 
-def _contacts(draft: Draft, groups: Groups, rounds: Sequence[Round], gap: float) -> list[Contact]:
-    """Pins in holes of other bodies; doubtful ones are findings, pressed ones are welded."""
-    contacts: list[Contact] = []
-    doubts: list[Contact] = []
-    for contact in _overlaps(rounds, ALIKE * gap):
-        pin, hole, play = contact.pin, contact.hole, contact.play
-        if hole.covered < COVERED[0]:
-            if 0 <= play <= gap:
-                what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
-                draft.warn("exchange.half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
-        elif play >= 0:
-            (contacts if play <= gap else doubts).append(contact)
-        elif -play <= max(gap, THREAD * pin.radius):
-            what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
-            draft.warn("exchange.interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
-            if groups(pin.body) != groups(hole.body):
-                groups.weld(hole.body, pin.body, f"{pin.body} is pressed or threaded into {hole.body}")
-        else:
-            doubts.append(contact)
-    met = {frozenset((contact.pin.body, contact.hole.body)) for contact in contacts}
-    for contact in doubts:
-        pin, hole, size = contact.pin, contact.hole, 1e3 * contact.play
-        if frozenset((pin.body, hole.body)) not in met and groups(pin.body) != groups(hole.body):
-            what = f"{pin.label} lies in {hole.label} with a gap of {size:.6g} mm on the radius: no joint is made of it"
-            if size < 0:
-                what = f"{pin.label} runs through the smaller {hole.label}: no joint is made of it"
-            draft.warn("exchange.gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=contact.play)
-    return contacts
-
-
 def _overlaps(rounds: Sequence[Round], widest: float) -> Iterator[Contact]:
     """Pins in holes of other bodies whose radius exceeds theirs by at most `widest`, or balls in sockets."""
     holes = [item for item in rounds if item.hole and item.covered >= COVERED[1]]
@@ -263,64 +202,25 @@ def _overlaps(rounds: Sequence[Round], widest: float) -> Iterator[Contact]:
         near = np.linalg.norm(away, axis=1) <= abs(radii - pin.radius) + NEAR + ANGLE * np.linalg.norm(off, axis=1)
         near &= (radii - pin.radius <= widest) & (ball | (abs(axes @ pin.axis) > 1 - ANGLE))
         for hole in (holes[index] for index in np.nonzero(near)[0] if holes[index].body != pin.body):
-            contact = _overlap(pin, hole)
-            if contact is not None:
-                yield contact
-
-
-def _overlap(pin: Round, hole: Round) -> Contact | None:
-    """Where a pin lies in a hole around the same axis, or a ball in a socket around the same centre."""
-    play = abs(hole.radius - pin.radius)
-    if pin.low == pin.high:  # balls
-        return Contact(pin, hole, 0.0, 0.0) if np.linalg.norm(pin.point - hole.point) <= play + NEAR else None
-    if not parallel(pin.axis, hole.axis):
-        return None
-    off = pin.point - hole.point
-    shift, sign = float(off @ hole.axis), float(np.sign(pin.axis @ hole.axis))
-    ends = sorted((shift + sign * pin.low, shift + sign * pin.high))
-    low, high = max(ends[0], hole.low), min(ends[1], hole.high)
-    if high - low < NEAR or np.linalg.norm(off - shift * hole.axis) > play + NEAR:
-        return None
-    return Contact(pin, hole, low, high)
-
-
-def _planes(faces: dict[str, list[Face]]) -> list[tuple[str, Array, float, Array]]:
-    """Flat faces: body, normal out of it, level along the normal and outline."""
-    planes = []
-    for body, all_faces in faces.items():
-        for face in (face for face in all_faces if face.kind == "plane" and len(face.outline)):
-            normal = face.axis if face.outward else -face.axis
-            planes.append((body, normal, float(face.outline[0] @ normal), face.outline))
-    return planes
-
-
-def _slots(draft: Draft, faces: dict[str, list[Face]], rounds: Sequence[Round], gap: float) -> None:
-    """Say which pins lie between two walls of another body: pins in slots, which are no joints of a model."""
-    planes = _planes(faces)
-    all_normals, levels = np.array([plane[1] for plane in planes]).reshape(-1, 3), np.array([p[2] for p in planes])
-    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
-        walls: dict[str, list[Array]] = defaultdict(list)
-        middle = pin.point + (pin.low + pin.high) / 2 * pin.axis
-        distances = all_normals @ middle - levels - pin.radius
-        near = (abs(all_normals @ pin.axis) < ANGLE) & (distances >= -NEAR) & (distances <= gap)
-        for body, normal, _, outline in (planes[index] for index in np.nonzero(near)[0]):
-            if body == pin.body:
-                continue
-            across = np.cross(pin.axis, normal)
-            low, high = (float(part) for part in ((outline @ across).min(), (outline @ across).max()))
-            along = (outline - pin.point) @ pin.axis
-            if low <= middle @ across <= high and along.max() > pin.low + NEAR and along.min() < pin.high - NEAR:
-                walls[body].append(normal)
-        for body, normals in walls.items():
-            if any(float(left @ other) < -1 + ANGLE for left, other in combinations(normals, 2)):
-                what = f"{pin.label} lies in a slot of {body}, which is no joint of a model"
-                remedy = f"add a massless link that turns on the pin and slides in {body}"
-                draft.warn("exchange.slot", f"links.{pin.body}", what, remedy)
+            off, play = pin.point - hole.point, abs(hole.radius - pin.radius) + NEAR
+            if ball:
+                if np.linalg.norm(off) <= play:
+                    yield Contact(pin, hole, 0.0, 0.0)
+            elif parallel(pin.axis, hole.axis):
+                shift, sign = float(off @ hole.axis), float(np.sign(pin.axis @ hole.axis))
+                ends = sorted((shift + sign * pin.low, shift + sign * pin.high))
+                low, high = max(ends[0], hole.low), min(ends[1], hole.high)
+                if high - low >= NEAR and np.linalg.norm(off - shift * hole.axis) <= play:
+                    yield Contact(pin, hole, low, high)
 
 
 def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
     """Flat faces of different bodies that look at each other across at most the gap and overlap."""
-    planes = _planes(faces)
+    planes = []  # body, normal out of it, level along the normal and outline
+    for body, all_faces in faces.items():
+        for face in (face for face in all_faces if face.kind == "plane" and len(face.outline)):
+            normal = face.axis if face.outward else -face.axis
+            planes.append((body, normal, float(face.outline[0] @ normal), face.outline))
     if not planes:
         return
     normals, levels = np.array([plane[1] for plane in planes]), np.array([plane[2] for plane in planes])
@@ -355,25 +255,23 @@ def _tight(outline: Array, normal: Array) -> Array:
 # ---- what the contacts mean -----------------------------------------------------------------------------------
 
 
-class _Held:
-    """The contacts of all bodies, and what they leave free."""
+class _Contacts:
+    """The contacts of all bodies, and what they leave free. leader: of bodies that move together, the first."""
 
-    def __init__(
-        self, draft: Draft, groups: Groups, contacts: list[Contact], balls: list[Contact], facings: list[Facing]
-    ) -> None:
-        self.draft, self.groups, self.contacts, self.balls, self.facings = draft, groups, contacts, balls, facings
+    def __init__(self, draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
+        self.draft, self.leader = draft, {name: name for name in draft.bodies}
         self._ends: dict[tuple[str, str], list[Facing]] = defaultdict(list)
-        axes, slack = [contact.hole.axis for contact in contacts], [abs(contact.play) for contact in contacts]
-        numbers = _line_numbers([contact.middle for contact in contacts], axes, slack)
-        self.line = dict(zip(contacts, numbers, strict=True))  # number of the axis of each contact
-        self.plane = self._plane()
-
-    def _plane(self) -> Array | None:
-        """The normal of a plane that the mechanism may move in: two pins along it, all others too or sliding in it."""
-        if self.balls or not self.contacts:
-            return None
-        for contact in self.contacts:
-            normal = contact.hole.axis
+        self.rounds = _rounds(faces, "cylinder")
+        self.facings = list(_facings(faces, gap))
+        self.contacts = self._joining(self.rounds, gap)
+        self.balls = self._joining(_rounds(faces, "sphere"), gap)
+        axes, slack = [contact.hole.axis for contact in self.contacts], [abs(contact.play) for contact in self.contacts]
+        numbers = _line_numbers([contact.middle for contact in self.contacts], axes, slack)
+        self.line = dict(zip(self.contacts, numbers, strict=True))  # number of the axis of each contact
+        self.plane: Array | None = (
+            None  # normal of the plane that it may move in: two pins along it, others slide in it
+        )
+        for normal in [] if self.balls else axes:
             along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
             across = [
                 other
@@ -382,8 +280,33 @@ class _Held:
                 and self.stops(other.hole.body, other.pin.body, other.hole.axis) < 2
             ]
             if len(self.lines(along)) > 1 and len(along) + len(across) == len(self.contacts):
-                return normal
-        return None
+                self.plane = normal
+                break
+
+    def _joining(self, rounds: Sequence[Round], gap: float) -> list[Contact]:
+        """Pins in holes of other bodies; doubtful ones are findings, pressed ones are welded."""
+        draft, contacts, doubts = self.draft, list[Contact](), list[Contact]()
+        for contact in _overlaps(rounds, ALIKE * gap):
+            pin, hole, play = contact.pin, contact.hole, contact.play
+            if hole.covered < COVERED[0]:
+                if 0 <= play <= gap:
+                    what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
+                    draft.warn(
+                        "exchange.half", f"links.{hole.body}", what, "add the joint to the model file if it is one"
+                    )
+            elif 0 <= play <= gap:
+                contacts.append(contact)
+            elif play < 0 and -play <= max(gap, THREAD * pin.radius):
+                what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
+                self.weld(hole.body, pin.body, what, "draw the play if they turn")
+            else:
+                doubts.append(contact)
+        met = {frozenset((contact.pin.body, contact.hole.body)) for contact in contacts}
+        for pin, hole, gap in ((contact.pin, contact.hole, contact.play) for contact in doubts):
+            if frozenset((pin.body, hole.body)) not in met and self.leader[pin.body] != self.leader[hole.body]:
+                what = f"{pin.label} and {hole.label} differ by {1e3 * gap:.6g} mm in radius: no joint is made of them"
+                draft.warn("exchange.gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=gap)
+        return contacts
 
     def lines(self, contacts: Sequence[Contact]) -> set[int]:
         """Numbers of the axes of contacts."""
@@ -393,7 +316,7 @@ class _Held:
         """Contacts of pins by the two bodies that they join."""
         joining: dict[tuple[str, str], list[Contact]] = defaultdict(list)
         for contact in self.contacts:
-            left, other = sorted((self.groups(contact.hole.body), self.groups(contact.pin.body)))
+            left, other = sorted((self.leader[contact.hole.body], self.leader[contact.pin.body]))
             if left != other:
                 joining[left, other].append(contact)
         return joining
@@ -407,15 +330,27 @@ class _Held:
         """Bodies with planes that face each other."""
         if not self._ends:
             for facing in self.facings:
-                first, second = map(self.groups, facing.bodies)
+                first, second = (self.leader[name] for name in facing.bodies)
                 if first != second:
                     self._ends[first, second].append(facing)
                     self._ends[second, first].append(facing.back)
         return [pair for pair in self._ends if pair[0] < pair[1]]
 
-    def weld(self, left: str, other: str, comment: str) -> None:
-        """Make two bodies one."""
-        self.groups.weld(left, other, comment)
+    def weld(self, left: str, other: str, what: str, remedy: str = "") -> None:
+        """Make two bodies one and say so; a doubt if there is a remedy."""
+        draft, first, second = self.draft, self.leader[left], self.leader[other]
+        if remedy:
+            draft.warn("exchange.fixed", f"links.{other}", what, remedy)
+        else:
+            draft.note("exchange.fixed", f"links.{other}", what)
+        if first == second:
+            return
+        if draft.ground and second == self.leader[draft.ground]:
+            first, second = second, first
+        self.leader = {name: first if lead == second else lead for name, lead in self.leader.items()}
+        name = free_name(f"fixed {left} {other}", draft.pairs)
+        draft.pairs[name] = Pair(name, "fixed", (first, second), np.zeros(3), comments=[what])
+        draft.bodies[other].comments.append(what)
         self._ends.clear()
 
     def stops(self, left: str, other: str, axis: Array) -> int:
@@ -423,97 +358,59 @@ class _Held:
         along = [facing.normal @ axis for facing in self.ends(left, other)]
         return int(any(part > 1 - ANGLE for part in along)) + int(any(part < -1 + ANGLE for part in along))
 
-    def step(self) -> bool:
-        """Make two bodies one that cannot move against each other; False if there are none left."""
-        return self._bolted() or self._boxed() or self._twins() or self._loose()
-
-    def patterns(self, rounds: Sequence[Round]) -> None:
-        """Bodies that touch where two holes of each lie on the same axes are bolted to each other."""
-        draft = self.draft
-        holes = [item for item in rounds if item.hole and item.covered > COVERED[0]]
+    def bolted(self) -> Iterator[tuple[str, str, str, str]]:
+        """Bodies that touch where two holes of each lie on the same axes, as a sentence and what to do if they move."""
+        holes = [item for item in self.rounds if item.hole and item.covered > COVERED[0]]
         numbers = _line_numbers([hole.point for hole in holes], [hole.axis for hole in holes], [0.0] * len(holes))
-        lines: dict[str, dict[int, Array]] = defaultdict(dict)
+        bolts: dict[str, dict[int, Array]] = defaultdict(dict)
         for hole, number in zip(holes, numbers, strict=True):
-            lines[hole.body][number] = hole.axis
+            bolts[hole.body][number] = hole.axis
         for facing in (facing for facing in self.facings if facing.gap <= NEAR):
             left, other = facing.bodies
-            shared = lines[left].keys() & lines[other].keys()
-            count = sum(parallel(lines[left][number], facing.normal) for number in shared)
-            if count > 1 and self.groups(left) != self.groups(other):
+            shared = bolts[left].keys() & bolts[other].keys()
+            count = sum(parallel(bolts[left][number], facing.normal) for number in shared)
+            if count > 1 and self.leader[left] != self.leader[other]:
                 what = f"{left} and {other} touch, and {count} holes of each lie on the same axes: fixed"
-                draft.warn("exchange.bolted", f"links.{other}", what, "draw the pins if they move")
-                self.weld(left, other, what)
+                yield left, other, what, "draw the pins if they move"
 
-    def _bolted(self) -> bool:
-        """Two bodies with pins on two axes do not turn; if planes touch or the axes cross they do not slide."""
-        draft = self.draft
-        for (left, other), contacts in self.between().items():
-            axis = contacts[0].hole.axis
-            if len(self.lines(contacts)) == 1:
-                continue
-            if self.stops(left, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
-                what = f"{left} and {other} are fixed to each other: pins on several axes join them"
-                draft.note("exchange.bolted", f"links.{other}", what)
-                self.weld(left, other, what)
-                return True
-        return False
-
-    def _boxed(self) -> bool:
-        """Two bodies that flat walls hold in all directions are one."""
-        draft = self.draft
+    def rigid(self) -> Iterator[tuple[str, ...]]:
+        """Two bodies that cannot move against each other, why, and what to do if they do; the surest first."""
         between = self.between()
+        for (left, other), contacts in between.items():
+            axis, parallels = contacts[0].hole.axis, [parallel(contacts[0].hole.axis, c.hole.axis) for c in contacts]
+            if len(self.lines(contacts)) > 1 and (self.stops(left, other, axis) or not all(parallels)):
+                yield left, other, f"{left} and {other} are fixed to each other: pins on several axes join them"
         for left, other in self.facing_pairs():
             if (left, other) not in between and len(self._walls(left, other)) > 2:
                 what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
-                draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
-                self.weld(left, other, what)
-                return True
-        return False
-
-    def _twins(self) -> bool:
-        """Two bodies on the same two axes move as one, such as the two side plates of a link."""
-        draft = self.draft
+                yield left, other, what, "draw the play if they move"
         lines: dict[str, set[int]] = defaultdict(set)
-        between = self.between()
         for pair, contacts in between.items():
             for body in pair:
                 lines[body] |= self.lines(contacts)
-        for left, other in combinations(lines, 2):
+        for left, other in combinations(lines, 2):  # such as the two side plates of a link
             if len(lines[left] & lines[other]) > 1 and tuple(sorted((left, other))) not in between:
-                what = f"{left} and {other} turn about the same axes and are one link"
-                draft.note("exchange.twins", f"links.{left}", what, "")
-                self.weld(left, other, what)
-                return True
-        return False
-
-    def _loose(self) -> bool:
-        """A pin or sleeve with all contacts on its own axis spins without effect: it is fixed at the least play."""
-        draft = self.draft
-        between = self.between()
-        for body in self.groups.bodies():
+                yield left, other, f"{left} and {other} turn about the same axes and are one link"
+        for body in (name for name in dict.fromkeys(self.leader.values()) if name in lines and len(between) > 1):
             mine = {pair: contacts for pair, contacts in between.items() if body in pair}
-            first = next(iter(mine.values()), [None])[0]
-            if first is None or len(between) == 1 or body == draft.ground or not self._centred(body, first):
+            if (
+                body == self.draft.ground
+                or len(lines[body]) > 1
+                or not self._centred(body, next(iter(mine.values()))[0])
+            ):
                 continue
-            aligned = len(self.lines([contact for contacts in mine.values() for contact in contacts])) == 1
-            ball = any(body in map(self.groups, (item.pin.body, item.hole.body)) for item in self.balls)
-            others = (other for other in self.groups.bodies() if other != body)
-            guided = any(tuple(sorted((body, other))) not in mine and self._walls(body, other) for other in others)
-            if not aligned or ball or guided:
+            ball = any(body in (self.leader[item.pin.body], self.leader[item.hole.body]) for item in self.balls)
+            others = (other for other in self.leader.values() if other != body)
+            if ball or any(tuple(sorted((body, other))) not in mine and self._walls(body, other) for other in others):
                 continue
-            plays = {pair: min(contact.play for contact in contacts) for pair, contacts in mine.items()}
-            tightest = min(plays, key=lambda pair: plays[pair])
+            tightest = min(mine, key=lambda pair: min(contact.play for contact in mine[pair]))
             holder = next(name for name in tightest if name != body)
-            what = f"{body} turns only about its own axis: it is taken as fixed in {holder}"
-            what += ", where its play is least" if len(mine) > 1 else ""
-            draft.note("exchange.loose", f"links.{body}", what, "draw less play where it is held")
-            self.weld(holder, body, what)
-            return True
-        return False
+            least = ", where its play is least" if len(mine) > 1 else ""
+            yield holder, body, f"{body} turns only about its own axis: it is taken as fixed in {holder}{least}"
 
     def _centred(self, body: str, contact: Contact) -> bool:
         """Whether the mass centre of a body lies on the axis of a contact."""
-        parts = [part for name, part in self.draft.bodies.items() if self.groups(name) == body]
+        parts = [part for name, part in self.draft.bodies.items() if self.leader[name] == body]
         mass = sum(part.mass for part in parts)
         centre = sum(part.mass * part.centre for part in parts) / mass if mass else parts[0].centre
         off = centre - contact.hole.point
@@ -536,36 +433,30 @@ class _Held:
         """What no joint connects with the rest is fixed to what it touches, or left out."""
         draft = self.draft
         while True:
-            bodies = self.groups.bodies()
-            links = {body: {body} for body in bodies}
-            near = [tuple(map(self.groups, (item.pin.body, item.hole.body))) for item in (*self.contacts, *self.balls)]
+            near = [(self.leader[i.pin.body], self.leader[i.hole.body]) for i in (*self.contacts, *self.balls)]
             near += [pair for pair in self.facing_pairs() if self._walls(*pair)]
-            for left, other in near:
-                if links[left] is not links[other]:
-                    united = links[left] | links[other]
-                    links.update(dict.fromkeys(united, united))
-            main = links[self.groups(draft.ground)] if draft.ground else max(links.values(), key=len)
-            apart = [body for body in bodies if body not in main]
-            flush = [tuple(map(self.groups, facing.bodies)) for facing in self.facings if facing.gap <= NEAR]
+            groups = components(self.leader.values(), near)
+            main = next((group for group in groups if self.leader.get(draft.ground) in group), max(groups, key=len))
+            flush = [[self.leader[name] for name in facing.bodies] for facing in self.facings if facing.gap <= NEAR]
             touching = [pair for pair in flush if (pair[0] in main) != (pair[1] in main)]
-            if not apart or not touching:
+            if not touching:
                 break
             left, other = touching[0] if touching[0][0] in main else touching[0][::-1]
             what = f"{other} has no joint with the rest, and touches {left}: it is taken as fixed to it"
-            draft.warn("exchange.touching", f"links.{other}", what, "draw the pin if it moves")
-            self.weld(left, other, what)
-        for body in apart if len(main) > 1 else []:
+            self.weld(left, other, what, "draw the pin if it moves")
+        if len(main) == 1:
+            return
+        for body in (body for body in dict.fromkeys(self.leader.values()) if body not in main):
             what = f"{body} has no joint with the rest and is left out"
             draft.warn("exchange.unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
-            for name in [name for name in draft.bodies if self.groups(name) == body]:
-                del draft.bodies[name]
-        names = set(draft.bodies)
-        draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= names}
+        self.leader = {name: lead for name, lead in self.leader.items() if lead in main}
+        names = self.leader.keys()
+        draft.bodies = {name: body for name, body in draft.bodies.items() if name in names}
+        draft.pairs = {name: pair for name, pair in draft.pairs.items() if names >= {*pair.links}}
         self.contacts = [item for item in self.contacts if {item.pin.body, item.hole.body} <= names]
         self.balls = [item for item in self.balls if {item.pin.body, item.hole.body} <= names]
-        self.facings = [facing for facing in self.facings if names.issuperset(facing.bodies)]
+        self.facings = [facing for facing in self.facings if names >= {*facing.bodies}]
         self._ends.clear()
-        self.groups.leader = {name: lead for name, lead in self.groups.leader.items() if name in names}
 
     # ---- pairs -------------------------------------------------------------------------------------------------
 
@@ -573,9 +464,20 @@ class _Held:
         """Add the pairs of all bodies that touch and move against each other."""
         between = self.between()
         for (left, other), contacts in between.items():
-            self._add(self._turning(left, other, contacts))
+            axis = contacts[0].hole.axis
+            stops = self.stops(left, other, axis)
+            if len(self.lines(contacts)) > 1:
+                comment = "pins on several parallel axes, and no end faces along them: it slides"
+                pair = _pair("prismatic", contacts, comment)
+            elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
+                pair = _pair("prismatic", contacts, "its axis lies in the plane of the mechanism: it slides")
+            else:
+                comment = f"end faces hold it in {('neither direction', 'one direction only', '')[stops]}"
+                turns = stops == 2 or self.plane is not None
+                pair = _pair("revolute" if turns else "cylindrical", contacts, comment if stops < 2 else "")
+            self._add(pair)
         for ball in self.balls:
-            if self.groups(ball.pin.body) != self.groups(ball.hole.body):
+            if self.leader[ball.pin.body] != self.leader[ball.hole.body]:
                 self._add(replace(_pair("spherical", [ball]), at=ball.hole.point, length=None))
         for left, other in sorted(self.facing_pairs()):
             walls = self._walls(left, other) if (left, other) not in between else []
@@ -586,22 +488,6 @@ class _Held:
         letters = (f"{chr(65 + n % 26)}{n // 26 or ''}" for n in range(26 * 1000))
         pair.name = next(name for name in letters if name not in self.draft.pairs and name not in self.draft.bodies)
         self.draft.pairs[pair.name] = pair
-
-    def _turning(self, left: str, other: str, contacts: list[Contact]) -> Pair:
-        """The pair of pins on one axis, or on several parallel ones that only slide."""
-        axis = contacts[0].hole.axis
-        stops = self.stops(left, other, axis)
-        if len(self.lines(contacts)) > 1:
-            pair = _pair("prismatic", contacts)
-            pair.comments.append("pins on several parallel axes, and no end faces along them: it slides")
-        elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
-            pair = _pair("prismatic", contacts)
-            pair.comments.append("its axis lies in the plane of the mechanism: it slides")
-        else:
-            pair = _pair("revolute" if stops == 2 or self.plane is not None else "cylindrical", contacts)
-            if stops < 2:
-                pair.comments.append(f"end faces hold it in {('neither direction', 'one direction only')[stops]}")
-        return pair
 
     def _sliding(self, left: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
         """The pair of bodies that flat walls guide."""
@@ -628,7 +514,7 @@ class _Held:
         self._add(pair)
 
 
-def _pair(kind: str, contacts: list[Contact]) -> Pair:
+def _pair(kind: str, contacts: list[Contact], comment: str = "") -> Pair:
     """A pair of pins on one axis: sizes of its longest bearing, length from the first end to the last."""
     main = max(contacts, key=lambda contact: contact.high - contact.low)
     axis = main.hole.axis
@@ -650,6 +536,7 @@ def _pair(kind: str, contacts: list[Contact]) -> Pair:
         pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")
     if kind in ("revolute", "cylindrical"):
         pair.comments.append(_nearest_fit(main))
+    pair.comments += [comment] if comment else []
     return pair
 
 

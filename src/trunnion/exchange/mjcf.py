@@ -13,17 +13,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Body, Draft, Pair, about, united
+from trunnion.exchange.draft import Array, Body, Draft, Pair, Place, refused, steiner, united
 from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import (
     APART,
     WORLD,
-    Frame,
     Scene,
     numbers,
     opening,
     parsed,
-    refused,
     spanning,
     stem,
     steps,
@@ -52,7 +50,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     reader = _Reader(root)
     draft = reader.draft
     for part in root.findall("worldbody"):
-        reader.contents(part, WORLD, Frame(), part.get("childclass", "main"))
+        reader.contents(part, WORLD, Place(), part.get("childclass", "main"))
     reader.weigh()
     reader.close_loops()
     reader.find_drives()
@@ -80,9 +78,9 @@ class _Reader(Scene):
         for part in root.findall("default"):
             self._defaults(part, "main", "main")
             self.defaults[part.get("class", "main")] = self.defaults["main"]
-        self.frames: dict[str, Frame] = {WORLD: Frame()}
+        self.frames: dict[str, Place] = {WORLD: Place()}
         self.sites: dict[str, tuple[str, Array]] = {}
-        self.geoms: dict[str, list[tuple[Frame, Mapping[str, str]]]] = defaultdict(list)
+        self.geoms: dict[str, list[tuple[Place, Mapping[str, str]]]] = defaultdict(list)
         self.weighed: set[str] = set()
         self.add_body(WORLD)
 
@@ -103,28 +101,28 @@ class _Reader(Scene):
             raise refused(f"<{element.tag}> is of the class {chosen!r}, which the file does not have")
         return {**self.defaults[chosen].get(element.tag, {}), **element.attrib}
 
-    def contents(self, element: Element, body: str, frame: Frame, style: str) -> None:
+    def contents(self, element: Element, body: str, frame: Place, style: str) -> None:
         """Read what lies in a body, or in a frame of it."""
         for child in element:
             if child.tag == "frame":
-                inner = frame.then(self._frame(child.attrib, "frame"))
+                inner = frame @ self._frame(child.attrib, "frame")
                 self.contents(child, body, inner, child.get("childclass", style))
             elif child.tag == "body":
                 self._body(child, body, frame, child.get("childclass", style))
             elif child.tag in ("geom", "site"):
                 values = self._with_defaults(child, style)
-                placed = frame.then(self._frame(values, child.tag))
+                placed = frame @ self._frame(values, child.tag)
                 if child.tag == "geom":
                     self.geoms[body].append((placed, values))
                 elif "name" in values:
-                    self.sites[values["name"]] = body, placed.place
-                    self.draft.bodies[body].points[values["name"]] = placed.place
+                    self.sites[values["name"]] = body, placed.shift
+                    self.draft.bodies[body].points[values["name"]] = placed.shift
 
-    def _body(self, element: Element, parent: str, outer: Frame, style: str) -> None:
+    def _body(self, element: Element, parent: str, outer: Place, style: str) -> None:
         """Read a body with its joints: several are a row of bodies, the first joint next to the parent."""
         name = element.get("name") or f"body{len(self.draft.bodies)}"
         body = self.add_body(name)
-        self.frames[name] = frame = outer.then(self._frame(element.attrib, f"body {name}"))
+        self.frames[name] = frame = outer @ self._frame(element.attrib, f"body {name}")
         self._note_lost("body", element.attrib, name)
         joints = [part for part in element if part.tag in ("joint", "freejoint")]
         links = [parent, *(f"{name}.{number + 1}" for number in range(len(joints) - 1)), name]
@@ -134,12 +132,12 @@ class _Reader(Scene):
         for number, part in enumerate(joints):
             self._joint(part, (links[number], links[number + 1]), frame, style)
         if not joints:
-            self.add_pair(Pair(f"{name}.fixed", "fixed", (parent, name), frame.place))
+            self.add_pair(Pair(f"{name}.fixed", "fixed", (parent, name), frame.shift))
         inertial = element.find("inertial")
         if inertial is not None and self.compiler.get("inertiafromgeom") != "true":
             where = f"inertial of body {name}"
-            placed = frame.then(self._frame(inertial.attrib, where))
-            body.mass, body.centre = float(numbers(inertial.get("mass"), f"mass of {where}", 1)[0]), placed.place
+            placed = frame @ self._frame(inertial.attrib, where)
+            body.mass, body.centre = float(numbers(inertial.get("mass"), f"mass of {where}", 1)[0]), placed.shift
             if "fullinertia" in inertial.attrib:
                 matrix = tensor(*numbers(inertial.get("fullinertia"), f"fullinertia of {where}", 6))
             else:
@@ -148,7 +146,7 @@ class _Reader(Scene):
             self.weighed.add(name)
         self.contents(element, name, frame, style)
 
-    def _joint(self, part: Element, links: tuple[str, str], frame: Frame, style: str) -> None:
+    def _joint(self, part: Element, links: tuple[str, str], frame: Place, style: str) -> None:
         """Read a joint; a free one is none."""
         values = self._with_defaults(part, style)
         kind = "free" if part.tag == "freejoint" else values.get("type", "hinge")
@@ -160,7 +158,7 @@ class _Reader(Scene):
             raise refused(f"has the type {kind!r}, which is no joint of MuJoCo", where)
         axis = unit(numbers(values.get("axis"), f"axis of {where}", 3, (0, 0, 1)), f"axis of {where}")
         place = numbers(values.get("pos"), f"pos of {where}", 3, (0, 0, 0))
-        pair = Pair(name, KINDS[kind], links, frame.at(place), frame.rotation @ axis)
+        pair = Pair(name, KINDS[kind], links, frame.at(place), frame.matrix @ axis)
         limited = values.get("limited", "auto")
         automatic = limited == "auto" and self.compiler.get("autolimits") != "false"
         if "range" in values and kind != "ball" and (limited == "true" or automatic):
@@ -176,13 +174,13 @@ class _Reader(Scene):
             if values.get(key, "0").strip() not in ("0", "false"):
                 self.draft.lose(key, name)
 
-    # Frames and masses
+    # Places and masses
 
-    def _frame(self, values: Mapping[str, str], where: str) -> Frame:
+    def _frame(self, values: Mapping[str, str], where: str) -> Place:
         """The frame that attributes state."""
         if "fromto" in values:
             start, end = numbers(values["fromto"], f"fromto of {where}", 6).reshape(2, 3)
-            return Frame(_onto(start - end, f"fromto of {where}"), (start + end) / 2)
+            return Place(_onto(start - end, f"fromto of {where}"), (start + end) / 2)
 
         def part(key: str, count: int, default: tuple[float, ...] | None = None) -> Array:
             return numbers(values.get(key), f"{key} of {where}", count, default)
@@ -206,7 +204,7 @@ class _Reader(Scene):
             rotation = _onto(part("zaxis", 3), where)
         elif "quat" in values:
             rotation = Rotation.from_quat(unit(part("quat", 4), where), scalar_first=True).as_matrix()
-        return Frame(rotation, place)
+        return Place(rotation, place)
 
     def weigh(self) -> None:
         """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
@@ -279,9 +277,9 @@ class _Reader(Scene):
             pose = numbers(values.get("relpose"), f"relpose of {where}", 7, (0,) * 7)
             if pose[3:].any():
                 relative = self._frame({"pos": text_of(pose[:3]), "quat": text_of(pose[3:])}, where)
-                nominal, drawn = self.frames[first].then(relative), self.frames[second]
-                other = place + nominal.place - drawn.place
-                if np.abs(nominal.rotation - drawn.rotation).max() > APART:
+                nominal, drawn = self.frames[first] @ relative, self.frames[second]
+                other = place + nominal.shift - drawn.shift
+                if np.abs(nominal.matrix - drawn.matrix).max() > APART:
                     raise refused("holds two bodies at another angle than the file draws them", where)
         gap = float(np.linalg.norm(place - other))
         if gap > APART:
@@ -315,7 +313,7 @@ def _onto(direction: Array, where: str) -> Array:
     return np.asarray(Rotation.from_rotvec(axis / sine * math.atan2(sine, z[2])).as_matrix())
 
 
-def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
+def _solid(frame: Place, values: Mapping[str, str], name: str) -> Body | None:
     """The body of a geom, in global axes; None if its mass cannot be found."""
     kind, where = values.get("type", "sphere"), f"size of a geom of body {name}"
     mass_stated = numbers(values.get("mass"), f"mass of a geom of body {name}", 1)[0] if "mass" in values else None
@@ -345,7 +343,7 @@ def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
         squares = np.array([across, across, (1 - ball) * b * b / 3 + ball * (a * a / 5 + b * b + 3 / 4 * a * b)])
     mass = density * volume if mass_stated is None else float(mass_stated)
     inertia = mass * np.diag(squares.sum() - squares)
-    return Body(name, mass, frame.place, frame.inertia(inertia))
+    return Body(name, mass, frame.shift, frame.inertia(inertia))
 
 
 # Out
@@ -403,8 +401,8 @@ def _inertia_at(draft: Draft, pair: Pair) -> float:
     """At most what a drive of a pair has to move, as if all bodies moved with it: kg m² about its axis, or kg."""
     if not PAIRS[pair.type].turns:
         return sum(body.mass for body in draft.bodies.values()) or 1.0
-    axis = pair.axis / np.linalg.norm(pair.axis)
-    return sum(float(axis @ about(body, pair.at) @ axis) for body in draft.bodies.values()) or 1.0
+    axis, bodies = pair.axis / np.linalg.norm(pair.axis), draft.bodies.values()
+    return sum(float(axis @ (b.inertia + b.mass * steiner(pair.at - b.centre)) @ axis) for b in bodies) or 1.0
 
 
 def _write_loops(draft: Draft, cuts: list[Pair], origins: Mapping[str, Array], equality: Element) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair, moved
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.names import nearest
 
 __all__ = ["complete", "flat_frame", "model_text"]
 
@@ -34,10 +36,12 @@ def complete(
     `turns`, m/s if not; the file's, else a usual one, if not given.
     Raises MechanismError if a stated name is not in the file, or the speed is not one of the driven joint.
     """
-    draft = replace(draft, findings=list(draft.findings))
-    if ground:
-        draft.ground = _existing(draft, ground, list(draft.bodies), "part", "--ground")
-    draft = draft.welded()
+    parts = list(draft.bodies)
+    draft = replace(draft, ground=ground or draft.ground, findings=list(draft.findings)).welded()
+    for name, names, noun, option in ((ground, parts, "part", "--ground"), (drive, draft.pairs, "joint", "--drive")):
+        if name and name not in names:
+            what = f"{name!r} is no {noun} of the file"
+            raise MechanismError(Finding(what, option, nearest(name, names), file=draft.source))
     if not draft.ground and draft.bodies:
         named = [name for name in draft.bodies if any(word in name.casefold() for word in FIXED)]
         joined = {name: len(draft.pairs_of(name)) for name in named or draft.bodies}
@@ -45,43 +49,27 @@ def complete(
         reason = "by its name" if named else f"it has the most joints, {joined[draft.ground]}"
         what = f"is taken as the part that does not move: {reason}"
         draft.note("exchange.ground", f"links.{draft.ground}", what, "state it with --ground")
+    turning = {name: PAIRS[pair.type].turns for name, pair in draft.pairs.items()}
     drivable = [name for name, pair in draft.pairs.items() if draft.ground in pair.links and PAIRS[pair.type].drivable]
     draft.drives = {name: rate for name, rate in draft.drives.items() if name in draft.pairs}
     if drive:
-        drive = _existing(draft, drive, list(draft.pairs), "joint", "--drive")
         draft.drives = {drive: draft.drives.get(drive, 0.0)}
     elif not draft.drives and drivable:
-        first = min(drivable, key=lambda name: not PAIRS[draft.pairs[name].type].turns)
-        draft.drives = {first: 0.0 if speed is not None else USUAL[PAIRS[draft.pairs[first].type].turns]}
+        first = min(drivable, key=lambda name: not turning[name])
+        draft.drives = {first: USUAL[turning[first]]}
         what = "is taken as the driver, at a usual speed: the first joint on the part that does not move"
         draft.note("exchange.drive", f"joints.{first}", what, "state it with --drive and --speed")
-    draft.drives = {name: _rate(draft, name, rate, speed, turns) for name, rate in draft.drives.items()}
-    return draft
-
-
-def _rate(draft: Draft, name: str, rate: float, speed: float | None, turns: bool | None) -> float:
-    """The rate of a drive: as stated, else that of the file, else a usual one, which is said."""
-    does = PAIRS[draft.pairs[name].type].turns
-    usual = "60 rpm" if does else "0.1 m/s"
-    if speed is not None:
-        if turns is not None and turns != does:
+    for name, rate in draft.drives.items():
+        usual = "60 rpm" if turning[name] else "0.1 m/s"
+        if speed is not None and turns is not None and turns != turning[name]:
             moves = {True: "turns", False: "slides"}
-            what = f"is a speed of a joint that {moves[turns]}, and {name} {moves[does]}"
+            what = f"is a speed of a joint that {moves[turns]}, and {name} {moves[turning[name]]}"
             raise MechanismError(Finding(what, "speed", f"give one such as {usual}"))
-        return speed
-    if not rate:
-        what = f"has no speed in the file; it gets {usual}"
-        draft.note("exchange.speed", f"drivers.{name}", what, "state it with --speed")
-    return rate or USUAL[does]
-
-
-def _existing(draft: Draft, name: str, names: list[str], noun: str, option: str) -> str:
-    if name in names:
-        return name
-    from trunnion.model.names import nearest
-
-    remedy = nearest(name, names)
-    raise MechanismError(Finding(f"{name!r} is no {noun} of the file", option, remedy, file=draft.source))
+        if speed is None and not rate:
+            what = f"has no speed in the file; it gets {usual}"
+            draft.note("exchange.speed", f"drivers.{name}", what, "state it with --speed")
+        draft.drives[name] = speed if speed is not None else rate or USUAL[turning[name]]
+    return draft
 
 
 def model_text(draft: Draft) -> str:
@@ -91,9 +79,9 @@ def model_text(draft: Draft) -> str:
     global frame, in a plane that of the plane through the first joint, so the mechanism starts as it is drawn.
     """
     normal = draft.plane_normal()
-    if normal is None:
-        return "\n".join(_lines(draft, spatial=True)) + "\n"
-    return "\n".join(_lines(_laid_flat(draft, normal), spatial=False)) + "\n"
+    if normal is not None:
+        draft = _laid_flat(draft, normal)
+    return "\n".join(_Writer(draft, spatial=normal is None).lines()) + "\n"
 
 
 def flat_frame(normal: Array) -> Array:
@@ -123,127 +111,109 @@ def _laid_flat(draft: Draft, normal: Array) -> Draft:
     return turned
 
 
-def _lines(draft: Draft, spatial: bool) -> Iterator[str]:
-    if draft.source:
-        yield f"# Made of {_comment(draft.source)}. Comments say how each number was found."
-    yield "trunnion: 1"
-    yield f"name: {_quoted(draft.name or 'Imported mechanism')}"
-    yield f"space: {'spatial' if spatial else 'planar'}"
-    if draft.gravity is not None:
-        yield f"gravity: {_plain(draft.gravity[: 3 if spatial else 2], float(np.abs(draft.gravity).max()))}"
-    yield f"ground: {_quoted(draft.ground)}"
-    if draft.mobility(planar=not spatial) < len(draft.drives):
-        yield "over_constraint: minimum-norm # joints hold more than statics can tell apart"
-    yield ""
-    yield "links:"
-    size = _size(draft)
-    for body in draft.bodies.values():
-        yield from _link(draft, body, spatial, size)
-    yield ""
-    yield "joints:" if draft.pairs else "joints: {}"
-    for pair in draft.pairs.values():
-        yield from _joint(pair, size)
-    yield ""
-    yield "drivers:" if draft.drives else "drivers: {}"
-    for name, rate in draft.drives.items():
-        pair = draft.pairs[name]
-        if PAIRS[pair.type].turns:
-            low, high = pair.limits or (-math.inf, math.inf)
-            ends = f", range: [{_number(math.degrees(low))} deg, {_number(math.degrees(high))} deg]"
-            closed = high - low >= 2 * math.pi
-            speed = _number(rate if closed else abs(rate))
-            yield f"  {_quoted(name)}: {{speed: {speed} rad/s{'' if closed else ends}}}"
-        else:
-            low, high = pair.limits or (0.0, size * STROKE)
-            ends = f"range: [{_number(1e3 * low)} mm, {_number(1e3 * high)} mm]"
-            yield f"  {_quoted(name)}: {{speed: {_number(abs(rate))} m/s, {ends}}}" + (
-                "" if pair.limits else "  # of the file's size; state the stroke"
-            )
+class _Writer:
+    """The lines of the model file of a draft. Lengths below TINY of its largest extent are rounding."""
 
+    def __init__(self, draft: Draft, spatial: bool) -> None:
+        self.draft, self.spatial, self.axes = draft, spatial, 3 if spatial else 2
+        places = [pair.at for pair in draft.pairs.values()]
+        places += [body.centre for body in draft.bodies.values() if body.mass > 0]
+        self.size = float(np.ptp(places, axis=0).max()) if places else 1.0
 
-def _link(draft: Draft, body: Body, spatial: bool, size: float) -> Iterator[str]:
-    for comment in body.comments:
-        yield f"  # {_comment(comment)}"
-    yield f"  {_quoted(body.name)}:"
-    yield "    points:" if draft.pairs_of(body.name) or body.points else "    points: {}"
-    for pair in draft.pairs_of(body.name):
-        yield f"      {_quoted(pair.name)}: {_point(pair, body.name, spatial, size)}"
-    for name, place in body.points.items():
-        yield f"      {_quoted(name)}: {_place(place, spatial, size)}"
-    if body.mass > 0 and body.name != draft.ground:
-        yield f"    mass: {_number(body.mass)} kg"
-        yield f"    centre: {_place(body.centre, spatial, size)}"
-        inertia = body.inertia
-        if not spatial:
-            yield f"    inertia: {_number(inertia[2, 2])} kg m^2"
-        elif np.abs(inertia).max() > 0:
-            keys = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-            least = TINY * np.abs(inertia).max()
-            parts = {key: inertia[at] for key, at in keys.items() if len(set(at)) == 1 or abs(inertia[at]) > least}
-            yield f"    inertia: {{{', '.join(f'{key}: {_number(part)}' for key, part in parts.items())}}}"
+    def mm(self, length: float) -> str:
+        return "0" if abs(length) <= TINY * self.size else f"{_number(1e3 * length)} mm"
 
+    def place(self, point: Array) -> str:
+        return f"[{', '.join(self.mm(float(part)) for part in point[: self.axes])}]"
 
-def _point(pair: Pair, body: str, spatial: bool, size: float) -> str:
-    place = _place(pair.at, spatial, size)
-    if not PAIRS[pair.type].needs_axis or (not spatial and pair.type != "prismatic"):
-        return place
-    axis = pair.axis
-    if pair.type == "universal" and pair.second_axis is not None and body == pair.links[1]:
-        axis = pair.second_axis
-    unit = axis / np.linalg.norm(axis)
-    return f"{{at: {place}, axis: {_plain(unit[: 3 if spatial else 2], 1.0)}}}"
+    def plain(self, vector: Array) -> str:
+        """A vector in SI, or a direction."""
+        least = TINY * float(np.abs(vector).max())
+        return f"[{', '.join('0' if abs(part) <= least else _number(part) for part in vector[: self.axes])}]"
 
+    def radius(self, size: float, limits: tuple[float, float] | None) -> str:
+        """With limits, the middle between them and half their distance."""
+        if limits is None:
+            return self.mm(size)
+        return f"{self.mm(size + sum(limits) / 2)} ± {self.mm((limits[1] - limits[0]) / 2)}"
 
-def _joint(pair: Pair, size: float) -> Iterator[str]:
-    for comment in pair.comments:
-        yield f"  # {_comment(comment)}"
-    if pair.limits is not None:
-        low, high = ((math.degrees(n), "deg") if PAIRS[pair.type].turns else (1e3 * n, "mm") for n in pair.limits)
-        yield f"  # moves from {_number(low[0])} to {_number(high[0])} {low[1]} from here"
-    parts = [f"type: {pair.type}", f"links: [{', '.join(_quoted(link) for link in pair.links)}]"]
-    if pair.pitch is not None:
-        parts.append(f"pitch: {_mm(pair.pitch, size)}")
-    turns = PAIRS[pair.type].turns
-    if turns and pair.pin_radius is not None:
-        pin = [f"radius: {_limited(pair.pin_radius, pair.pin_limits, size)}"]
-        if pair.length is not None:
-            pin.append(f"length: {_mm(pair.length, size)}")
-        if pair.hole_radius is not None and (pair.pin_limits or pair.hole_limits):
-            pin.append(f"hole_radius: {_limited(pair.hole_radius, pair.hole_limits, size)}")
-        elif pair.clearance is not None and pair.clearance > 0:
-            pin.append(f"clearance: {_mm(pair.clearance, size)}")
-        parts.append(f"pin: {{{', '.join(pin)}}}")
-    elif not turns and pair.length is not None and pair.type == "prismatic":
-        play = f", clearance: {_mm(pair.clearance, size)}" if pair.clearance else ""
-        parts.append(f"guide: {{length: {_mm(pair.length, size)}{play}}}")
-    yield f"  {_quoted(pair.name)}: {{{', '.join(parts)}}}"
+    def lines(self) -> Iterator[str]:
+        draft = self.draft
+        if draft.source:
+            yield f"# Made of {_comment(draft.source)}. Comments say how each number was found."
+        yield "trunnion: 1"
+        yield f"name: {_quoted(draft.name or 'Imported mechanism')}"
+        yield f"space: {'spatial' if self.spatial else 'planar'}"
+        if draft.gravity is not None:
+            yield f"gravity: {self.plain(draft.gravity)}"
+        yield f"ground: {_quoted(draft.ground)}"
+        if draft.mobility(planar=not self.spatial) < len(draft.drives):
+            yield "over_constraint: minimum-norm # joints hold more than statics can tell apart"
+        yield from ("", "links:")
+        for body in draft.bodies.values():
+            yield from self.link(body)
+        yield from ("", "joints:" if draft.pairs else "joints: {}")
+        for pair in draft.pairs.values():
+            yield from self.joint(pair)
+        yield from ("", "drivers:" if draft.drives else "drivers: {}")
+        for name, rate in draft.drives.items():
+            pair, note = draft.pairs[name], ""
+            low, high = pair.limits or (0.0, self.size * STROKE)
+            if not PAIRS[pair.type].turns:
+                stated = f"{_number(abs(rate))} m/s, range: [{_number(1e3 * low)} mm, {_number(1e3 * high)} mm]"
+                note = "" if pair.limits else "  # of the file's size; state the stroke"
+            elif pair.limits and high - low < 2 * math.pi:
+                low, high = math.degrees(low), math.degrees(high)
+                stated = f"{_number(abs(rate))} rad/s, range: [{_number(low)} deg, {_number(high)} deg]"
+            else:
+                stated = f"{_number(rate)} rad/s"
+            yield f"  {_quoted(name)}: {{speed: {stated}}}{note}"
 
+    def link(self, body: Body) -> Iterator[str]:
+        points = {name: self.place(point) for name, point in body.points.items()}
+        joints = {}
+        for pair in self.draft.pairs_of(body.name):
+            joints[pair.name] = self.place(pair.at)
+            if PAIRS[pair.type].needs_axis and (self.spatial or pair.type == "prismatic"):
+                second = pair.type == "universal" and pair.second_axis is not None and body.name == pair.links[1]
+                axis: Any = pair.second_axis if second else pair.axis
+                joints[pair.name] = f"{{at: {self.place(pair.at)}, axis: {self.plain(axis / np.linalg.norm(axis))}}}"
+        yield from (f"  # {_comment(comment)}" for comment in body.comments)
+        yield f"  {_quoted(body.name)}:"
+        yield "    points:" if joints or points else "    points: {}"
+        yield from (f"      {_quoted(name)}: {text}" for name, text in (*joints.items(), *points.items()))
+        if body.mass > 0 and body.name != self.draft.ground:
+            yield f"    mass: {_number(body.mass)} kg"
+            yield f"    centre: {self.place(body.centre)}"
+            entries = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+            parts = {key: body.inertia[at] for key, at in entries.items()}
+            least = TINY * np.abs(body.inertia).max()
+            if not self.spatial:
+                yield f"    inertia: {_number(parts['zz'])} kg m^2"
+            elif least > 0:
+                parts = {key: part for key, part in parts.items() if key[0] == key[1] or abs(part) > least}
+                yield f"    inertia: {{{', '.join(f'{key}: {_number(part)}' for key, part in parts.items())}}}"
 
-def _size(draft: Draft) -> float:
-    """The largest extent of the places of all pairs, m."""
-    places = [pair.at for pair in draft.pairs.values()]
-    places += [body.centre for body in draft.bodies.values() if body.mass > 0]
-    return float(np.ptp(places, axis=0).max()) if places else 1.0
-
-
-def _place(place: Array, spatial: bool, size: float) -> str:
-    return f"[{', '.join(_mm(float(part), size) for part in place[: 3 if spatial else 2])}]"
-
-
-def _mm(length: float, size: float) -> str:
-    return "0" if abs(length) <= TINY * size else f"{_number(1e3 * length)} mm"
-
-
-def _limited(radius: float, limits: tuple[float, float] | None, size: float) -> str:
-    """A radius between limits that its file states: their middle and half their distance."""
-    if limits is None:
-        return _mm(radius, size)
-    return f"{_mm(radius + sum(limits) / 2, size)} ± {_mm((limits[1] - limits[0]) / 2, size)}"
-
-
-def _plain(vector: Array, largest: float) -> str:
-    parts = ("0" if abs(part) <= TINY * largest else _number(float(part)) for part in vector)
-    return f"[{', '.join(parts)}]"
+    def joint(self, pair: Pair) -> Iterator[str]:
+        yield from (f"  # {_comment(comment)}" for comment in pair.comments)
+        turns = PAIRS[pair.type].turns
+        if pair.limits is not None:
+            factor, unit = (180 / math.pi, "deg") if turns else (1e3, "mm")
+            low, high = (_number(factor * end) for end in pair.limits)
+            yield f"  # moves from {low} to {high} {unit} from here"
+        parts = [f"type: {pair.type}", f"links: [{', '.join(_quoted(link) for link in pair.links)}]"]
+        if pair.pitch is not None:
+            parts.append(f"pitch: {self.mm(pair.pitch)}")
+        length = [] if pair.length is None else [f"length: {self.mm(pair.length)}"]
+        play = [f"clearance: {self.mm(pair.clearance)}"] if pair.clearance is not None and pair.clearance > 0 else []
+        if turns and pair.pin_radius is not None:
+            if pair.hole_radius is not None and (pair.pin_limits or pair.hole_limits):
+                play = [f"hole_radius: {self.radius(pair.hole_radius, pair.hole_limits)}"]
+            radius = f"radius: {self.radius(pair.pin_radius, pair.pin_limits)}"
+            parts.append(f"pin: {{{', '.join([radius, *length, *play])}}}")
+        elif pair.type == "prismatic" and length:
+            parts.append(f"guide: {{{', '.join([*length, *play])}}}")
+        yield f"  {_quoted(pair.name)}: {{{', '.join(parts)}}}"
 
 
 def _number(value: float) -> str:

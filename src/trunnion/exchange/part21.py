@@ -11,7 +11,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.exchange.draft import few, refused
 
 __all__ = ["Entity", "Part21", "Ref", "quoted"]
 
@@ -50,15 +50,11 @@ class Part21:
 
     def __init__(self, path: Path) -> None:
         raw = path.read_bytes()
-        self.path = path
         if b"ISO-10303-21" not in raw[:4096]:
-            raise self.unreadable("is not a STEP file: it does not begin with ISO-10303-21", "export it again")
+            raise refused("is not a STEP file: it does not begin with ISO-10303-21")
         if b"ENDSEC" not in raw[-4096:]:
-            raise self.unreadable("is cut off: its end is missing", "copy or export it again")
-        count = raw.count(b"=")
-        if count > LARGEST:
-            what = f"has about {count:,} entities; at most {LARGEST:,} are read"
-            raise self.unreadable(what, "export fewer parts, without threads, screws and logos")
+            raise refused("is cut off: its end is missing")
+        few(raw.count(b"="), LARGEST, "entities")
         self.text = raw.decode("utf-8", errors="replace")
         self.spans: dict[int, tuple[int, int]] = {}
         self._kinds: dict[str, list[int]] = defaultdict(list)
@@ -67,18 +63,14 @@ class Part21:
         while start is not None:
             number, body = int(start[1][:18]), _BODY.match(self.text, start.end())
             if body is None:
-                raise self.unreadable(f"is damaged at #{number}: the entity has no end")
+                raise refused(f"is damaged at #{number}: the entity has no end")
             self.spans[number] = start.end(), body.end() - 1
             kind = _KIND.match(body[0])
             for name in [kind[1]] if kind else re.findall(r"([A-Z][A-Z0-9_]*)\s*\(", body[0]):
                 self._kinds[name].append(number)
             start = _START.search(self.text, body.end())
         if not self.spans:
-            raise self.unreadable("has no entities", "export it again")
-
-    def unreadable(self, what: str, remedy: str = "export it again") -> MechanismError:
-        """What forbids to read the file, to be raised."""
-        return MechanismError(Finding(what, file=str(self.path), remedy=remedy, code="exchange.step"))
+            raise refused("has no entities")
 
     def of(self, kind: str) -> list[int]:
         """Numbers of all entities of a kind, in the order of the file."""
@@ -89,7 +81,7 @@ class Part21:
         entity = self._read.get(number)
         if entity is None:
             if number not in self.spans:
-                raise self.unreadable(f"refers to #{number}, which it does not have")
+                raise refused(f"refers to #{number}, which it does not have")
             start, end = self.spans[number]
             entity = self._read[number] = self._parsed(number, self.text[start:end])
         return entity
@@ -102,7 +94,7 @@ class Part21:
         """The arguments of an entity that must be of a kind."""
         entity = self[number] if isinstance(number, Ref | int) else {}
         if kind not in entity:
-            raise self.unreadable(f"has {', '.join(entity) or 'nothing'} at #{number} where {kind} belongs")
+            raise refused(f"has {', '.join(entity) or 'nothing'} at #{number} where {kind} belongs")
         return entity[kind]
 
     def references(self, number: int) -> set[int]:
@@ -120,7 +112,7 @@ class Part21:
         while position < end:
             token = _TOKEN.match(text, position)
             if token is None:
-                raise self.unreadable(f"cannot be read at #{number}: '{text[position : position + 30].strip()}'")
+                raise refused(f"cannot be read at #{number}: '{text[position : position + 30].strip()}'")
             position = token.end()
             name = token.lastgroup or "sign"
             value: str = token[name]
@@ -132,7 +124,7 @@ class Part21:
                 pending = ""
             elif value == ")" and name == "sign":
                 if len(stack) < 2:
-                    raise self.unreadable(f"has a bracket too many at #{number}")
+                    raise refused(f"has a bracket too many at #{number}")
                 inner, kind = stack.pop(), kinds.pop()
                 stack[-1].append((kind, inner) if kind else inner)
             elif name == "sign":
@@ -141,16 +133,23 @@ class Part21:
             else:
                 stack[-1].append(_value(name, value))
             if len(stack) > DEEPEST:
-                raise self.unreadable(f"has more than {DEEPEST} brackets in one another at #{number}")
+                raise refused(f"has more than {DEEPEST} brackets in one another at #{number}")
         records = values[0] if len(values) == 1 and isinstance(values[0], list) else values
         if len(stack) > 1 or not all(isinstance(record, tuple) for record in records):
-            raise self.unreadable(f"cannot be read at #{number}: its brackets do not match")
+            raise refused(f"cannot be read at #{number}: its brackets do not match")
         return dict(records)
 
 
 def _value(name: str, text: str) -> Any:
+    """A token as a Python value; in a text \\X2\\…\\X0\\ are signs in UTF-16, \\X\\… and \\S\\… those of ISO 8859-1."""
+
+    def decoded(match: re.Match[str]) -> str:
+        if match[1]:
+            return bytes.fromhex(match[1]).decode("utf-16-be", errors="replace")
+        return chr(int(match[2], 16)) if match[2] else chr(ord(match[3]) + 128)
+
     if name == "string":
-        return _WIDE.sub(_decoded, text[1:-1].replace("''", "'")).replace("\\\\", "\\")
+        return _WIDE.sub(decoded, text[1:-1].replace("''", "'")).replace("\\\\", "\\")
     if name == "ref":
         return Ref(text)
     if name == "number":
@@ -158,19 +157,8 @@ def _value(name: str, text: str) -> Any:
     return text == "T" if name == "enum" and text in ("T", "F") else text
 
 
-def _decoded(match: re.Match[str]) -> str:
-    if match[1]:
-        return bytes.fromhex(match[1]).decode("utf-16-be", errors="replace")
-    return chr(int(match[2], 16)) if match[2] else chr(ord(match[3]) + 128)
-
-
 def quoted(text: str) -> str:
     """A text as a string of a STEP file."""
-
-    def coded(sign: str) -> str:
-        if " " <= sign <= "~":
-            return sign
-        return f"\\X2\\{sign.encode('utf-16-be').hex().upper()}\\X0\\"
-
-    plain = text.replace("\\", "\\\\").replace("'", "''")
-    return "'" + "".join(coded(sign) for sign in plain) + "'"
+    signs = text.replace("\\", "\\\\").replace("'", "''")
+    coded = (c if " " <= c <= "~" else f"\\X2\\{c.encode('utf-16-be').hex().upper()}\\X0\\" for c in signs)
+    return f"'{''.join(coded)}'"

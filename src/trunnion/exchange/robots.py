@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree.ElementTree import Element, ElementTree, ParseError, TreeBuilder, indent
 
 import numpy as np
@@ -15,12 +14,23 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from trunnion.algebra.dual import primal
-from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name, perpendicular
+from trunnion.errors import MechanismError
+from trunnion.exchange.draft import (
+    PARALLEL,
+    Array,
+    Body,
+    Draft,
+    Pair,
+    components,
+    few,
+    free_name,
+    perpendicular,
+    refused,
+)
 from trunnion.exchange.skeleton import Positions
 
-__all__ = ["Frame", "Scene", "laid_out", "numbers", "opening", "parsed", "refused", "spanning", "stem", "steps",
-           "tensor", "text_of", "turned", "unit", "written"]  # fmt: skip
+__all__ = ["Scene", "laid_out", "numbers", "opening", "parsed", "spanning", "stem", "steps", "tensor",
+           "text_of", "turned", "unit", "written"]  # fmt: skip
 
 MOST_BYTES, MOST_ELEMENTS, DEEPEST, MOST_PARTS = 10_000_000, 100_000, 200, 2_000
 LONGEST = 1000  # characters of a row of numbers
@@ -28,30 +38,6 @@ MEETING = 1e-8  # m, between the axes of joints that count as crossing
 APART = 1e-5  # m, between points of two bodies that a loop holds together, as a program writes their places
 WORLD = "world"
 LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds
-
-
-class Frame(NamedTuple):
-    """A frame in the global one: rotation matrix and place of its origin, m."""
-
-    rotation: Array = np.eye(3)
-    place: Array = np.zeros(3)
-
-    def at(self, point: Array) -> Array:
-        """A point of the frame in global coordinates."""
-        return np.asarray(self.rotation @ point + self.place)
-
-    def then(self, inner: Frame) -> Frame:
-        """The frame that lies as `inner` in this one."""
-        return Frame(self.rotation @ inner.rotation, self.at(inner.place))
-
-    def inertia(self, matrix: Array) -> Array:
-        """A tensor of the frame in global axes."""
-        return np.asarray(self.rotation @ matrix @ self.rotation.T)
-
-
-def refused(what: str, where: str = "", remedy: str = "mend the file") -> MechanismError:
-    """What cannot be read."""
-    return MechanismError(Finding(what, where, remedy, code="exchange.xml"))
 
 
 class _Builder(TreeBuilder):
@@ -62,9 +48,8 @@ class _Builder(TreeBuilder):
     def start(self, tag: str, attrs: dict[str, str], /) -> Element:
         """Count an element that begins."""
         self.count, self.depth = self.count + 1, self.depth + 1
-        if self.count > MOST_ELEMENTS or self.depth > DEEPEST:
-            what = f"has more than {MOST_ELEMENTS:,} elements, or nests them deeper than {DEEPEST}"
-            raise refused(what, remedy="export the mechanism alone")
+        few(self.count, MOST_ELEMENTS, "elements")
+        few(self.depth, DEEPEST, "elements in one another")
         return super().start(tag, attrs)
 
     def end(self, tag: str, /) -> Element:
@@ -78,8 +63,7 @@ def parsed(path: Path, name: str) -> Element:
 
     Entities of its own and references to other files are refused, and so is a file that would fill the memory.
     """
-    if path.stat().st_size > MOST_BYTES:
-        raise refused(f"has more than {MOST_BYTES:,} bytes", remedy="export the mechanism alone, with meshes apart")
+    few(path.stat().st_size, MOST_BYTES, "bytes")
     parser = DefusedXMLParser(target=_Builder())
     try:
         parser.feed(path.read_bytes())  # in pieces, a huge token would be read again for each
@@ -87,13 +71,13 @@ def parsed(path: Path, name: str) -> Element:
     except DefusedXmlException:
         raise refused("declares entities of its own, which are not read", remedy="remove the DOCTYPE") from None
     except ParseError as error:
-        raise refused(f"is no sound XML: {error}", remedy="export it again") from None
+        raise refused(f"is no sound XML: {error}") from None
     except MechanismError:
         raise
     except (LookupError, ValueError):
         raise refused("has an unknown encoding", remedy="save it as UTF-8") from None
     if root.tag != name:
-        raise refused(f"begins with <{root.tag}>, not with <{name}>", remedy="")
+        raise refused(f"begins with <{root.tag}>, not with <{name}>")
     return root
 
 
@@ -215,7 +199,7 @@ def laid_out(
 
 
 def opening(positions: Positions, also: str = "") -> Draft:
-    """The draft to write, with notes on what the format cannot hold."""
+    """The draft to write, with notes on what the format cannot hold; also: what else that is."""
     draft, mechanism = positions.draft(), positions.mechanism
     places = (path.split(".") for path, value in mechanism.parameters().items() if np.any(primal(value)))
     entries = {place[2] for place in places if place[0] == "joints" and place[-1] != "pair_factor"}
@@ -226,9 +210,14 @@ def opening(positions: Positions, also: str = "") -> Draft:
         draft.note("exchange.lost", "", f"is written without {', '.join(lost)}")
     draft.name = "".join(sign for sign in draft.name if sign.isprintable())  # XML has no other signs
     for body in draft.bodies.values():
-        body.inertia = _realisable(body.inertia)
+        a, b, c = np.linalg.eigvalsh(body.inertia)
+        if a + b - c < 1e-12 * c:  # of a plate, which rounding would make impossible
+            body.inertia = body.inertia + 1e-12 * c * np.eye(3)
     if WORLD in draft.bodies and draft.ground != WORLD:
-        draft = _called_otherwise(draft, WORLD)
+        other = free_name(f"{WORLD}-link", draft.bodies)
+        what = f"is written as {other!r}, for {WORLD!r} is the ground of the format"
+        draft.note("exchange.name", f"links.{WORLD}", what)
+        _rename(draft, {name: other if name == WORLD else name for name in draft.bodies})
     massless = [name for name, body in draft.bodies.items() if name != draft.ground and not body.mass > 0]
     if massless:
         what = f"have no mass, which engines in time refuse: {', '.join(massless)}"
@@ -236,23 +225,16 @@ def opening(positions: Positions, also: str = "") -> Draft:
     return draft
 
 
-def _called_otherwise(draft: Draft, name: str) -> Draft:
-    """The draft with a body of another name, which the format keeps for its ground."""
-    other = free_name(f"{name}-link", draft.bodies)
-    draft.note("exchange.name", f"links.{name}", f"is written as {other!r}, for {name!r} is the ground of the format")
-    renamed = {name: other}
-    bodies = {renamed.get(key, key): replace(body, name=renamed.get(key, key)) for key, body in draft.bodies.items()}
-    pairs = {
-        key: replace(pair, links=(renamed.get(pair.links[0], pair.links[0]), renamed.get(pair.links[1], pair.links[1])))
-        for key, pair in draft.pairs.items()
+def _rename(draft: Draft, names: Mapping[str, str], joints: Mapping[str, str] | None = None) -> None:
+    """Give bodies, and joints, other names."""
+    joints = joints or {name: name for name in draft.pairs}
+    draft.bodies = {names[name]: replace(body, name=names[name]) for name, body in draft.bodies.items()}
+    draft.pairs = {
+        joints[name]: replace(pair, name=joints[name], links=(names[pair.links[0]], names[pair.links[1]]))
+        for name, pair in draft.pairs.items()
     }
-    return replace(draft, bodies=bodies, pairs=pairs)
-
-
-def _realisable(inertia: Array) -> Array:
-    """The tensor, by 1e-12 larger where it is that of a plate, which rounding would make impossible."""
-    a, b, c = np.linalg.eigvalsh(inertia)
-    return inertia + 1e-12 * c * np.eye(3) if a + b - c < 1e-12 * c else inertia
+    draft.drives = {joints[name]: rate for name, rate in draft.drives.items() if name in joints}
+    draft.ground = names.get(draft.ground, "")
 
 
 # In: chains made pairs again, and names and grounds as a model has them
@@ -297,37 +279,55 @@ class Scene:
         """
         draft = self.draft
         if not draft.pairs:
-            raise refused("has no joints", remedy="export a mechanism")
-        if max(len(draft.bodies), len(draft.pairs)) > MOST_PARTS:
-            what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
-            raise refused(what, remedy="export the mechanism alone")
-        for first, second, ratio in self.couplings:
-            self._couple(first, second, ratio)
+            raise refused("has no joints")
+        few(max(len(draft.bodies), len(draft.pairs)), MOST_PARTS, "bodies or joints")
+        self._couple()
         self._join()
         busiest = max(draft.bodies, key=lambda name: len(draft.pairs_of(name)))
         start = next(name for name in (ground, world, busiest) if draft.pairs_of(name))
-        _leave_loose(draft, start)
+        groups = components(draft.bodies, [pair.links for pair in draft.pairs.values()])
+        reached = next(group for group in groups if start in group)
+        free = [name for name in draft.bodies if name not in reached]
+        if free:
+            listed = ", ".join(free[:10]) + " …" * (len(free) > 10)
+            what = f"are joined to nothing that is fixed, and left out: {listed}"
+            draft.warn("exchange.free", "links", what, "join them to the ground, or state another one with --ground")
+        draft.bodies = {name: body for name, body in draft.bodies.items() if name in reached}
+        draft.pairs = {name: pair for name, pair in draft.pairs.items() if pair.links[0] in reached}
         draft.ground = start if start in (ground, world) else ""
         base = draft.pairs_of(WORLD)
         if draft.ground == WORLD and base and all(pair.type == "fixed" for pair in base):
             draft.ground = next(link for link in base[0].links if link != WORLD)
-        _rename(draft)
+        names, joints = dict[str, str](), dict[str, str]()
+        for name in draft.bodies:
+            names[name] = free_name(name, names.values(), "body")
+        for name in draft.pairs:
+            joints[name] = free_name(name, joints.values(), "joint")
+        for name, body in draft.bodies.items():  # points without the name of the body, which they have in a file
+            points: dict[str, Array] = {}
+            for key, place in body.points.items():
+                points[free_name(key.removeprefix(f"{name}."), [*points, *joints.values()], "point")] = place
+            body.points = points
+        _rename(draft, names, joints)
         return draft
 
-    def _couple(self, name: str, other: str, ratio: float) -> None:
+    def _couple(self) -> None:
         """Make a thread of two joints that turn and slide one body; others are gears, which are not read."""
         draft = self.draft
-        slide, turn = draft.pairs.get(name), draft.pairs.get(other)
-        what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
-        if slide is not None and turn is not None and ratio:
-            if slide.type == "revolute":
-                slide, turn, ratio = turn, slide, 1 / ratio
-            along = float(slide.axis @ turn.axis) / float(np.linalg.norm(slide.axis) * np.linalg.norm(turn.axis))
-            common = set(slide.links) & set(turn.links) & self.between
-            if (slide.type, turn.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
-                turn.pitch = 2 * math.pi * ratio * along
-                return
-        draft.warn("exchange.gears", "joints", what, "state it under gears in the model")
+        for name, other, ratio in self.couplings:
+            coupled = ratio
+            ends = [draft.pairs[key] for key in (name, other) if key in draft.pairs]
+            if len(ends) == 2 and ratio:
+                slide, turn = ends
+                if slide.type == "revolute":
+                    slide, turn, coupled = turn, slide, 1 / ratio
+                along = float(slide.axis @ turn.axis / (np.linalg.norm(slide.axis) * np.linalg.norm(turn.axis)))
+                common = set(slide.links) & set(turn.links) & self.between
+                if (slide.type, turn.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
+                    turn.pitch = 2 * math.pi * coupled * along
+                    continue
+            what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
+            draft.warn("exchange.gears", "joints", what, "state it under gears in the model")
 
     def _join(self) -> None:
         """Make one pair of joints in a row, where there is such a pair."""
@@ -391,49 +391,3 @@ def _pair_of(chain: list[Pair], drives: Mapping[str, float]) -> Pair | None:
     if counts == (2, 0):
         return Pair(name, "universal", links, place, axes[0], axes[1]) if abs(axes[0] @ axes[1]) < PARALLEL else None
     return Pair(name, "spherical", links, place) if abs(np.linalg.det(axes)) > PARALLEL else None
-
-
-def _leave_loose(draft: Draft, start: str) -> None:
-    """Leave out the bodies that no chain of pairs joins to the one that is fixed."""
-    reached, front = {start}, [start]
-    neighbours: dict[str, set[str]] = {}
-    for pair in draft.pairs.values():
-        for link, other in (pair.links, pair.links[::-1]):
-            neighbours.setdefault(link, set()).add(other)
-    while front:
-        new = neighbours.get(front.pop(), set()) - reached
-        reached |= new
-        front += new
-    free = [name for name in draft.bodies if name not in reached]
-    if free:
-        what = f"are joined to nothing that is fixed, and left out: {_listed(free)}"
-        draft.warn("exchange.free", "links", what, "join them to the ground, or state another one with --ground")
-    draft.bodies = {name: body for name, body in draft.bodies.items() if name in reached}
-    draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= reached}
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Names in a sentence, the first ten of many."""
-    return ", ".join(names[:10]) + " …" * (len(names) > 10)
-
-
-def _rename(draft: Draft) -> None:
-    """Give all parts names that a model accepts; points without the name of the body, which they have in a file."""
-    names: dict[str, str] = {}
-    for name in draft.bodies:
-        names[name] = free_name(name, names.values(), "body")
-    joints: dict[str, str] = {}
-    for name in draft.pairs:
-        joints[name] = free_name(name, joints.values(), "joint")
-    bodies = {}
-    for name, body in draft.bodies.items():
-        points: dict[str, Array] = {}
-        for key, place in body.points.items():
-            points[free_name(key.removeprefix(f"{name}."), [*points, *joints.values()], "point")] = place
-        bodies[names[name]] = replace(body, name=names[name], points=points)
-    draft.pairs = {
-        joints[name]: replace(pair, name=joints[name], links=(names[pair.links[0]], names[pair.links[1]]))
-        for name, pair in draft.pairs.items()
-    }
-    draft.drives = {joints[name]: rate for name, rate in draft.drives.items() if name in joints}
-    draft.bodies, draft.ground = bodies, names.get(draft.ground, "")

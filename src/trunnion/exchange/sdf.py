@@ -9,17 +9,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, Place, refused
 from trunnion.exchange.formats import ImportOptions
 from trunnion.exchange.robots import (
     WORLD,
-    Frame,
     Scene,
     laid_out,
     numbers,
     opening,
     parsed,
-    refused,
     tensor,
     text_of,
     unit,
@@ -65,8 +63,8 @@ class Reader(Scene):
     def __init__(self, name: str, version: str) -> None:
         super().__init__(name)
         self.version = tuple(int(part) if part.isdigit() else 0 for part in version.split("."))
-        self.poses: dict[str, tuple[Frame, str]] = {}  # of every frame, and what it is relative to
-        self.frames: dict[str, Frame] = {WORLD: Frame()}  # those that are found in the global one
+        self.poses: dict[str, tuple[Place, str]] = {}  # of every frame, and what it is relative to
+        self.frames: dict[str, Place] = {WORLD: Place()}  # those that are found in the global one
         self.attached: dict[str, str] = {}  # what a frame moves with
         self.joints: list[tuple[Element, str]] = []
 
@@ -89,7 +87,7 @@ class Reader(Scene):
                 self._place(part, f"joint {name}", child if child == WORLD else prefix + child, prefix)
             elif part.tag == "model":
                 self.add_model(part, f"{name}::", base)
-                self.poses[name], self.attached[name] = (Frame(), f"{name}::__model__"), f"{name}::__model__"
+                self.poses[name], self.attached[name] = (Place(), f"{name}::__model__"), f"{name}::__model__"
             elif part.tag == "plugin" and part.findtext("joint_name"):
                 rate = numbers(part.findtext("initial_velocity"), f"initial_velocity of {name}", 1, (0,))
                 self.draft.drives[prefix + part.findtext("joint_name", "").strip()] = float(rate[0])
@@ -97,7 +95,7 @@ class Reader(Scene):
                 self.draft.lose("plugin", part.get("name", ""))
         for part in model.findall("joint"):  # its name may also be that of a link, in URDF and old files
             name = prefix + part.get("name", "joint")
-            self.poses.setdefault(name, (Frame(), f"joint {name}"))
+            self.poses.setdefault(name, (Place(), f"joint {name}"))
         for link in model.findall("link"):
             name = prefix + link.get("name", "link")
             self._weigh(link, name)
@@ -114,7 +112,7 @@ class Reader(Scene):
         relative = "" if pose is None else pose.get("relative_to") or pose.get("frame") or ""
         self.poses[name] = _pose(pose, name), prefix + relative if relative else default
 
-    def frame(self, name: str) -> Frame:
+    def frame(self, name: str) -> Place:
         """The global frame of a name; MechanismError if poses go round in a circle or name what is not there."""
         row = [name]
         while row[-1] not in self.frames:
@@ -125,7 +123,7 @@ class Reader(Scene):
                 raise refused("its pose is relative to itself, through others", name)
         for inner in reversed(row[:-1]):
             local, outer = self.poses[inner]
-            self.frames[inner] = self.frames[outer].then(local)
+            self.frames[inner] = self.frames[outer] @ local
         return self.frames[name]
 
     def _weigh(self, link: Element, name: str) -> None:
@@ -136,13 +134,13 @@ class Reader(Scene):
             what = "states no mass, which by the rules of SDF is 1 kg with 1 kg m² about each axis"
             draft.warn("exchange.mass", f"links.{name}", what, "state its mass in the model")
             inertial = Element("inertial") if inertial is None else inertial
-        frame = self.frame(name).then(_pose(inertial.find("pose"), f"inertial of {name}"))
+        frame = self.frame(name) @ _pose(inertial.find("pose"), f"inertial of {name}")
         body.mass = float(numbers(inertial.findtext("mass"), f"mass of {name}", 1, (1,))[0])
         entries = [
             float(numbers(inertial.findtext(f"inertia/i{key}"), f"i{key} of {name}", 1, (key[0] == key[1],))[0])
             for key in ("xx", "yy", "zz", "xy", "xz", "yz")
         ]
-        body.centre, body.inertia = frame.place, frame.inertia(tensor(*entries))
+        body.centre, body.inertia = frame.shift, frame.inertia(tensor(*entries))
 
     def add_joints(self) -> None:
         """Make pairs of the joints that were collected, and points of the frames."""
@@ -163,7 +161,7 @@ class Reader(Scene):
         for name in self.attached:
             link = self._link(name)
             if link and not name.endswith("__model__") and name not in bodies:
-                bodies[link].points[name] = self.frame(name).place
+                bodies[link].points[name] = self.frame(name).shift
         for name in bodies:  # between joints of a row, as this program writes them
             row, _, number = name.rpartition(".")
             pairs = self.draft.pairs_of(name) if row and number.isdigit() else []
@@ -185,7 +183,7 @@ class Reader(Scene):
         for key in ("damping", "friction", "spring_stiffness"):
             if any(numbers(value.text, f"{key} of {where}", 1, (0,))[0] for value in part.iter(key)):
                 self.draft.lose(key, name)
-        pair = Pair(name, TYPES[kind], (ends[0], ends[1]), self.frame(where).place)
+        pair = Pair(name, TYPES[kind], (ends[0], ends[1]), self.frame(where).shift)
         if pair.type not in ("spherical", "fixed"):
             pair.axis = self._axis(part, "axis", where, prefix)
             texts = [part.findtext(f"axis/limit/{end}", "inf").replace("inf", "1e16") for end in ("lower", "upper")]
@@ -213,7 +211,7 @@ class Reader(Scene):
         elif in_model or self.version < (1, 5):
             frame = f"{prefix}__model__"
         name = f"{tag} of {where}"
-        return np.asarray(self.frame(frame).rotation @ unit(numbers(text, name, 3, (0, 0, 1)), name))
+        return np.asarray(self.frame(frame).matrix @ unit(numbers(text, name, 3, (0, 0, 1)), name))
 
     def _link(self, name: str) -> str:
         """The link that a name is, or that the frame moves with which it names; empty if there is none."""
@@ -231,17 +229,17 @@ def end_of(part: Element, tag: str) -> str:
     return name
 
 
-def _pose(pose: Element | None, name: str) -> Frame:
+def _pose(pose: Element | None, name: str) -> Place:
     """The frame of a pose: x y z roll pitch yaw."""
     if pose is None or not (pose.text or "").strip():
-        return Frame()
+        return Place()
     where = f"pose of {name}"
     if pose.get("rotation_format") == "quat_xyzw":
         values = numbers(pose.text, where, 7)
-        return Frame(Rotation.from_quat(unit(values[3:], where)).as_matrix(), values[:3])
+        return Place(Rotation.from_quat(unit(values[3:], where)).as_matrix(), values[:3])
     values = numbers(pose.text, where, 6)
     turns = Rotation.from_euler("xyz", values[3:], degrees=pose.get("degrees") in YES)
-    return Frame(turns.as_matrix(), values[:3])
+    return Place(turns.as_matrix(), values[:3])
 
 
 # Out

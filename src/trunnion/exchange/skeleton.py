@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Positions", "positions_of"]
 
+LENGTHS = "pin.bearing", "pin.length", "guide.length"  # of a bearing: the first that is stated
 CYCLE = 720  # positions at which the stroke of a driven slide is looked for
 
 
@@ -62,12 +63,20 @@ class Positions:
             axes = "xyz"[: mechanism.coordinates]
             draft.gravity = np.zeros(3)
             draft.gravity[: len(axes)] = [_float(values[f"gravity.{axis}"]) for axis in axes]
-        for link in mechanism.effective_links:
-            draft.bodies[link] = self._body(system, values, link, row)
+        for link, entry in mechanism.effective_links.items():
+            rotation, origin = self.rotations[link][row], self.origins[link][row]
+            centre, inertia = _mass_properties(system, values, link)
+            body = Body(link, _float(values[f"links.{link}.mass"]), origin + rotation @ centre)
+            body.inertia = rotation @ inertia @ rotation.T
+            for name in entry.points:
+                if name not in mechanism.effective_joints:
+                    local = _in_space(system.vector(values, f"links.{link}.points.{name}"))
+                    body.points[name] = origin + rotation @ local
+            draft.bodies[link] = body
         elements = system.elements(values)
         for name, joint in mechanism.effective_joints.items():
-            first, second = (self._placed(elements[link, name], link, row) for link in joint.links)
-            draft.pairs[name] = _pair(name, joint.type, joint.links, first, second, values, system)
+            ends = [self._placed(elements[link, name], link, row) for link in joint.links]
+            draft.pairs[name] = _pair(name, joint.type, (joint.links[0], joint.links[1]), ends, values, system.spatial)
         time = np.array([self.result["time"].values[row]])
         for name, driver in mechanism.drivers.items():
             draft.drives[name] = self.rate(name, row) if driver.moves else _float(system.drive(values, name, time)[1])
@@ -92,17 +101,6 @@ class Positions:
         motion = "rotation" if PAIRS[kind].turns else "slide"
         return float(self.result[f"joint_{motion}_velocity"].sel(joint=joint).values[row])
 
-    def _body(self, system: System, values: Any, link: str, row: int) -> Body:
-        rotation, origin = self.rotations[link][row], self.origins[link][row]
-        centre, inertia = _mass_properties(system, values, link)
-        body = Body(link, _float(values[f"links.{link}.mass"]), origin + rotation @ centre)
-        body.inertia = rotation @ inertia @ rotation.T
-        link_entry = self.mechanism.effective_links[link]
-        for name in link_entry.points:
-            if name not in self.mechanism.effective_joints:
-                body.points[name] = origin + rotation @ _in_space(system.vector(values, f"links.{link}.points.{name}"))
-        return body
-
     def _placed(self, element: Any, link: str, row: int) -> tuple[Array, Array, Array]:
         """Place, axis and x of a joint's element in the global frame."""
         rotation, origin = self.rotations[link][row], self.origins[link][row]
@@ -113,26 +111,19 @@ class Positions:
         return origin + rotation @ place, rotation @ axis, rotation @ across
 
 
-def _pair(name: str, kind: str, links: Sequence[str], first: Any, second: Any, values: Any, system: System) -> Pair:
+def _pair(name: str, kind: str, links: tuple[str, str], ends: Sequence[Any], values: Any, spatial: bool) -> Pair:
     """The pair of a joint whose two elements lie so: its point is that on the second link."""
-    along = 2 if kind == "prismatic" and not system.spatial else 1
-    pair = Pair(name, kind, (links[0], links[1]), second[0], first[along])
+    along = 2 if kind == "prismatic" and not spatial else 1
+    first, second = ends
+    pair = Pair(name, kind, links, second[0], first[along], second[1] if kind == "universal" else None)
     if not PAIRS[kind].guided:  # a slide's element on its guide is a point of the rail, wherever the slider is
-        pair.elements = {link: (end[0], end[along]) for link, end in zip(links, (first, second), strict=True)}
-    if kind == "universal":
-        pair.second_axis = second[1]
-    path = f"joints.{name}"
-
-    def number(key: str) -> float | None:
-        value = values.get(f"{path}.{key}")
-        return None if value is None else _float(value)
-
-    pair.pin_radius = number("pin.radius")
-    play = number("pin.clearance")
-    if pair.pin_radius is not None and play is not None:
-        pair.hole_radius = pair.pin_radius + play
-    pair.length = number("pin.bearing") or number("pin.length") or number("guide.length")
-    pair.pitch = number("pitch")
+        pair.elements = {link: (end[0], end[along]) for link, end in zip(links, ends, strict=True)}
+    paths = {key: f"joints.{name}.{key}" for key in ("pin.radius", "pin.clearance", "pitch", *LENGTHS)}
+    numbers = {key: _float(values[path]) for key, path in paths.items() if values.get(path) is not None}
+    pair.pin_radius, pair.pitch = numbers.get("pin.radius"), numbers.get("pitch")
+    if {"pin.radius", "pin.clearance"} <= numbers.keys():
+        pair.hole_radius = numbers["pin.radius"] + numbers["pin.clearance"]
+    pair.length = next((numbers[key] for key in LENGTHS if numbers.get(key)), None)
     return pair
 
 
@@ -157,11 +148,7 @@ def _mass_properties(system: System, values: Any, link: str) -> tuple[Array, Arr
 
 
 def positions_of(
-    mechanism: Mechanism,
-    steps: int = 360,
-    at: float | str | None = None,
-    progress: Callable[[int], None] | None = None,
-    magnify: float = 1.0,
+    mechanism: Mechanism, steps: int = 360, at: float | str | None = None, magnify: float = 1.0
 ) -> Positions:
     """The mechanism at positions of its cycle, or at one.
 
@@ -177,52 +164,44 @@ def positions_of(
     """
     from trunnion.cycle.analyse import analyse
 
+    spatial = mechanism.space == "spatial"
     variables = ["point_position", "joint_rotation_velocity", "joint_slide_velocity"]
-    variables += ["link_position", "link_rotation"] if mechanism.space == "spatial" else ["link_angle"]
+    variables += ["link_position", "link_rotation"] if spatial else ["link_angle"]
     if magnify != 1:
         if not mechanism.has_errors:
             what = "has nothing to magnify: no errors, and no pin that lies off the middle of its hole"
             raise MechanismError(Finding(what, "--magnify", "leave it out, or state `errors` or seats"))
         variables += ["point_error", "link_error"]
-    result = analyse(mechanism, steps, progress=progress, variables=variables, at=at)
-    rotations, origins = {}, {}
+    result = analyse(mechanism, steps, variables=variables, at=at)
+    values, rotations, origins = mechanism.parameters(), dict[str, Array](), dict[str, Array]()
     for link in result["link"].values.astype(str):
-        matrix, origin = _poses(mechanism, result, link)
-        points = (str(point) for point in result["point"].values if str(point).startswith(f"{link}."))
-        if magnify != 1 and (point := next(points, "")):
-            turn, shift = (factor * (magnify - 1) for factor in _errors(result, link, point))
-            place = _places(result["point_position"], point)
-            local = np.einsum("nji,nj->ni", matrix, place - origin)
+        points = [str(point) for point in result["point"].values if str(point).startswith(f"{link}.")]
+        if spatial:
+            matrix = np.moveaxis(rotation_matrix(result["link_rotation"].sel(link=link).values), 2, 0)
+            origin = result["link_position"].sel(link=link).values.T
+        else:
+            angle, name = result["link_angle"].sel(link=link).values, next(iter(mechanism.links[link].points))
+            matrix = np.repeat(np.eye(3)[None], len(angle), axis=0)
+            matrix[:, 0, 0] = matrix[:, 1, 1] = np.cos(angle)
+            matrix[:, 1, 0], matrix[:, 0, 1] = np.sin(angle), -np.sin(angle)
+            local = _in_space([values[f"links.{link}.points.{name}.{axis}"] for axis in "xy"])
+            origin = _places(result["point_position"], f"{link}.{name}") - matrix @ local
+        if magnify != 1 and points:
+            error = np.atleast_2d(result["link_error"].sel(link=link).values)  # a rotation vector, about z in a plane
+            turn = (magnify - 1) * np.pad(error, ((3 - len(error), 0), (0, 0))).T
+            shift = (magnify - 1) * _places(result["point_error"], points[0])
+            place = _places(result["point_position"], points[0])
+            fixed = np.einsum("nji,nj->ni", matrix, place - origin)
             matrix = Rotation.from_rotvec(turn).as_matrix() @ matrix
-            origin = place + shift - np.einsum("nij,nj->ni", matrix, local)
+            origin = place + shift - np.einsum("nij,nj->ni", matrix, fixed)
         rotations[link], origins[link] = matrix, origin
     return Positions(mechanism, result, rotations, origins)
-
-
-def _errors(result: xr.Dataset, link: str, point: str) -> tuple[Array, Array]:
-    """Rotation vector, rad, of a link and displacement, m, of a point from the ideal mechanism, (position, 3)."""
-    turn = result["link_error"].sel(link=link).values.T
-    return np.pad(turn[:, None], ((0, 0), (2, 0))) if turn.ndim == 1 else turn, _places(result["point_error"], point)
 
 
 def _places(values: xr.DataArray, point: str) -> Array:
     """A vector of a point in space, (position, 3)."""
     vectors = values.sel(point=point).values.T
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
-
-
-def _poses(mechanism: Mechanism, result: xr.Dataset, link: str) -> tuple[Array, Array]:
-    """Rotation matrices (position, 3, 3) and origins (position, 3) of a link's frame."""
-    if mechanism.space == "spatial":
-        matrix = rotation_matrix(result["link_rotation"].sel(link=link).values)
-        return np.moveaxis(matrix, 2, 0), result["link_position"].sel(link=link).values.T
-    angle = result["link_angle"].sel(link=link).values
-    c, s, zero, unit = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    matrix = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, unit]]), 2, 0)
-    values, point = mechanism.parameters(), next(iter(mechanism.links[link].points))
-    local = _in_space([values[f"links.{link}.points.{point}.{axis}"] for axis in "xy"])
-    origin = _places(result["point_position"], f"{link}.{point}") - matrix @ local
-    return matrix, origin
 
 
 def _in_space(vector: Sequence[Any]) -> Array:

@@ -19,12 +19,12 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.brep import Face, Moments, Solid
-from trunnion.exchange.draft import Array, Body, Draft, free_name
+from trunnion.exchange.draft import Array, Body, Draft, Place, free_name, refused
 from trunnion.exchange.formats import MATERIALS, ImportOptions
 from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.part21 import Part21, quoted
-from trunnion.exchange.step_assembly import Assembly, Occurrence, Place
+from trunnion.exchange.step_assembly import Assembly, Occurrence
 
 if TYPE_CHECKING:
     from trunnion.exchange.skeleton import Positions
@@ -67,7 +67,7 @@ def _opened(path: Path, options: ImportOptions) -> tuple[Draft, Assembly, dict[s
         raise
     except BROKEN as error:
         what = f"is not as ISO 10303-21 has it: {type(error).__name__} {error}"[:200]
-        raise file.unreadable(what) from None
+        raise refused(what) from None
 
 
 def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:
@@ -99,15 +99,14 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
                 for face in _placed(solid.faces, place)
             ]
             if len(entries) > 1:
-                _rigid(draft, body.name, link, entries)
+                kind = "sub-assembly" if link.children else "part"
+                what = f"is a {kind} of {len(entries)} solids, taken as one rigid link"
+                remedy = "export it dissolved, its parts right below the top, if they move"
+                draft.warn("exchange.rigid", f"links.{body.name}", what, remedy)
     if not draft.bodies:
-        meshes = file.of("TESSELLATED_SOLID") or file.of("SHELL_BASED_SURFACE_MODEL")
-        what = "has surfaces or meshes, but no solids" if meshes else "has no solids"
-        raise file.unreadable(what, "export solids, as AP214 or AP242 with exact geometry")
+        raise refused("has no solids", remedy="export solids, as AP214 or AP242 with exact geometry")
     if assembly.missing:
-        what = f"states no length unit: {1e3 * options.unit:.6g} mm is taken"
-        if not options.unit_stated:
-            draft.warn("exchange.unit", "", what, "state it with --unit")
+        draft.assumed_unit(options)
     draft.ground = options.ground if options.ground in draft.bodies else ""
     joined(draft, faces, options.gap)
     still = complete(draft)
@@ -131,14 +130,6 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
     return solids
 
 
-def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry]) -> None:
-    """Say that several solids are taken as one rigid link."""
-    kind = "sub-assembly" if link.children else "part"
-    what = f"is a {kind} of {len(entries)} solids, taken as one rigid link"
-    remedy = "export it dissolved, its parts right below the top, if they move"
-    draft.warn("exchange.rigid", f"links.{name}", what, remedy)
-
-
 def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: ImportOptions, draft: Draft) -> Body:
     """A link of solids: mass, centre and inertia in the global frame."""
     total = Moments()
@@ -159,7 +150,7 @@ def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: Impo
             doubts = "; ".join(dict.fromkeys(solid.doubts))
             what = f"has a solid (#{solid.number}) that is not integrated by its faces: {doubts}; its mass is {how}"
             draft.warn("exchange.mesh", f"links.{name}", what, "compare it with that of the CAD program")
-        total = total + moments.placed(place.matrix, place.shift) * density
+        total = total + moments.at(place) * density
         body.comments.append(f"{leaf.name or name}, solid #{solid.number}: {density:g} kg/m³ {origin}, {how}")
     if total.volume > 0:
         body.mass, body.centre, body.inertia = total.volume, total.centre, total.inertia
@@ -173,7 +164,7 @@ def _placed(faces: Sequence[Face], place: Place) -> list[Face]:
         replace(
             face,
             frame=face.frame @ place.matrix.T / scale,
-            origin=place.matrix @ face.origin + place.shift,
+            origin=place.at(face.origin),
             radius=scale * face.radius,
             area=scale**2 * face.area,
             outline=face.outline @ place.matrix.T + place.shift,
@@ -345,7 +336,7 @@ def _relation(first: int, second: int, operator: int) -> str:
 def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) -> list[int]:
     """A link as its points, the lines between them and the axes of its joints, in its own frame."""
     places = {pair.name: pair.element(body.name)[0] for pair in draft.pairs_of(body.name)} | body.points
-    local = {name: inside.matrix @ place + inside.shift for name, place in places.items()}
+    local = {name: inside.at(place) for name, place in places.items()}
     points = [text(f"CARTESIAN_POINT({quoted(name)},({_reals(1e3 * place)}))") for name, place in local.items()]
     lines = [(f"{a}-{b}", local[a], local[b]) for a, b in pairwise(local)]
     if len(local) > 2:
@@ -371,9 +362,10 @@ def write_moved(positions: Positions, path: Path, original: Path) -> list[Findin
     turn = _model_frame(positions, draft)
     changes: dict[int, str] = {}
     text = _Text(max(file.spans) + 1)
-    links = _links_of(draft, positions)
+    leader = draft.leaders()
+    links = {leader[link]: link for link in positions.mechanism.effective_links if link in leader}
     for name, part in parts.items():
-        link = links.get(name, "")
+        link = links.get(leader[name], "") if name in leader else ""
         if not link:
             what = f"is a part of {original.name!r} and no link of the model"
             remedy = "--from takes what the usual --gap and --unit read; import it with these"
@@ -411,22 +403,11 @@ def _move(assembly: Assembly, part: Occurrence, move: Place, text: _Text, change
         inner = inner.inverse
     if file.kind(operator) != "ITEM_DEFINED_TRANSFORMATION":
         what = f"places {part.name!r} by an operator, which is not rewritten"
-        raise file.unreadable(what, "export it again as AP214")
+        raise refused(what, remedy="export it again as AP214")
     start = file[operator]["ITEM_DEFINED_TRANSFORMATION"][2]
     end = text.placement(inner @ assembly.frame(start, first), assembly.geometry(second).length)
     new = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{start},#{end})")
     changes[part.relation] = _relation(first, second, new)
-
-
-def _links_of(draft: Draft, positions: Positions) -> dict[str, str]:
-    """The link of the model that each part of the file belongs to: its own, or that of a part fixed to it."""
-    groups = {name: {name} for name in draft.bodies}
-    for pair in (pair for pair in draft.pairs.values() if pair.type == "fixed"):
-        united = groups[pair.links[0]] | groups[pair.links[1]]
-        groups.update(dict.fromkeys(united, united))
-    return {
-        name: link for name, group in groups.items() for link in positions.mechanism.effective_links if link in group
-    }
 
 
 def _model_frame(positions: Positions, draft: Draft) -> Array:

@@ -10,32 +10,15 @@ from typing import Any
 import numpy as np
 
 from trunnion.exchange.brep import Geometry, Solid
-from trunnion.exchange.draft import Array
+from trunnion.exchange.draft import Place, few, refused
 from trunnion.exchange.part21 import Part21, Ref
 
-__all__ = ["Assembly", "Occurrence", "Place"]
+__all__ = ["Assembly", "Occurrence"]
 
 MOST = 2000  # occurrences of parts
 PREFIXES = {"KILO": 1e3, "DECI": 0.1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6, "NANO": 1e-9, None: 1.0}
 SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP")
 SURFACES = ("SHELL_BASED_SURFACE_MODEL", "TESSELLATED_SOLID", "TESSELLATED_SHELL", "GEOMETRIC_SET")
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a part lies in another frame: matrix · q + shift, m; the matrix may mirror and scale."""
-
-    matrix: Array = field(default_factory=lambda: np.asarray(np.eye(3)))
-    shift: Array = field(default_factory=lambda: np.zeros(3))
-
-    def __matmul__(self, inner: Place) -> Place:
-        return Place(self.matrix @ inner.matrix, self.matrix @ inner.shift + self.shift)
-
-    @property
-    def inverse(self) -> Place:
-        """The place of the other frame in this one."""
-        matrix = np.asarray(np.linalg.inv(self.matrix), dtype=float)
-        return Place(matrix, -matrix @ self.shift)
 
 
 @dataclass
@@ -77,29 +60,16 @@ class Assembly:
         self._geometries: dict[int, Geometry] = {}
         self._solids: dict[int, tuple[list[tuple[Solid, Place]], int]] = {}
         self.shapes: dict[int, list[int]] = defaultdict(list)  # representations by product definition
-        shape_of = {}
-        for shape in file.of("PRODUCT_DEFINITION_SHAPE"):
-            shape_of[shape] = file[shape]["PRODUCT_DEFINITION_SHAPE"][2]
+        shape_of = {shape: file[shape]["PRODUCT_DEFINITION_SHAPE"][2] for shape in file.of("PRODUCT_DEFINITION_SHAPE")}
         for relation in file.of("SHAPE_DEFINITION_REPRESENTATION"):
             shape, representation = file.args(relation, "SHAPE_DEFINITION_REPRESENTATION")[:2]
             if shape in shape_of:
                 self.shapes[shape_of[shape]].append(representation)
-        self._join_equal_shapes()
-        self.places = {}  # of a use: the relation that holds it
-        for entity in file.of("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"):
-            relation, shape = file.args(entity, "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION")[:2]
-            self.places[shape_of.get(shape)] = relation
-        self.uses: dict[int, list[tuple[int, int]]] = defaultdict(list)  # (use, child) by parent
-        for use in file.of("NEXT_ASSEMBLY_USAGE_OCCURRENCE"):
-            parent, child = file.args(use, "NEXT_ASSEMBLY_USAGE_OCCURRENCE")[3:5]
-            self.uses[parent].append((use, child))
-
-    def _join_equal_shapes(self) -> None:
-        """Representations that a relation without a transformation makes one belong to the same product."""
+        # representations that a relation without a transformation makes one belong to the same product
         equal: dict[int, set[int]] = defaultdict(set)
         for kind in ("SHAPE_REPRESENTATION_RELATIONSHIP", "REPRESENTATION_RELATIONSHIP"):
-            for number in self.file.of(kind):
-                entity = self.file[number]
+            for number in file.of(kind):
+                entity = file[number]
                 if "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION" not in entity and len(entity[kind]) == 4:
                     first, other = entity[kind][2:]
                     equal[first].add(other)
@@ -107,6 +77,14 @@ class Assembly:
         for shapes in self.shapes.values():
             for shape in shapes:  # grows while it runs
                 shapes += sorted(equal[shape] - set(shapes))
+        self.places = {}  # of a use: the relation that holds it
+        for placed in file.of("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"):
+            relation, shape = file.args(placed, "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION")[:2]
+            self.places[shape_of.get(shape)] = relation
+        self.uses: dict[int, list[tuple[int, int]]] = defaultdict(list)  # (use, child) by parent
+        for use in file.of("NEXT_ASSEMBLY_USAGE_OCCURRENCE"):
+            parent, child = file.args(use, "NEXT_ASSEMBLY_USAGE_OCCURRENCE")[3:5]
+            self.uses[parent].append((use, child))
 
     def name(self, definition: int) -> str:
         """Name of a product."""
@@ -126,20 +104,19 @@ class Assembly:
             nonlocal count
             count += 1
             visited.add(occurrence.definition)
-            if count > MOST:
-                raise self.file.unreadable(f"has more than {MOST:,} parts", "export the parts that move")
+            few(count, MOST, "parts")
             if occurrence.definition in above:
-                raise self.file.unreadable(f"has the product {occurrence.name!r} inside itself")
+                raise refused(f"has the product {occurrence.name!r} inside itself")
             for index, (use, child) in enumerate(self.uses.get(occurrence.definition, [])):
-                above_it = occurrence.place
                 inner, relation, forward = self._placed(use, occurrence.definition, child, index)
-                part = Occurrence(self.name(child), child, above_it @ inner, relation, forward, above_it)
+                place = occurrence.place @ inner
+                part = Occurrence(self.name(child), child, place, relation, forward, occurrence.place)
                 occurrence.children.append(expanded(part, (*above, occurrence.definition)))
             return occurrence
 
         tree = [expanded(Occurrence(self.name(root), root, Place()), ()) for root in roots if self.is_product(root)]
         for left in (number for number in every if number not in visited and self.is_product(number)):
-            raise self.file.unreadable(f"has the product {self.name(left)!r} inside itself")
+            raise refused(f"has the product {self.name(left)!r} inside itself")
         return tree
 
     def is_product(self, definition: Any) -> bool:
@@ -160,7 +137,7 @@ class Assembly:
             same = [use for use, other in self.uses[parent][:index] if other == child]
             if len(same) < len(mapped):
                 return mapped[len(same)], 0, True
-            raise self.file.unreadable(f"does not say where {self.name(child)!r} lies in {self.name(parent)!r}")
+            raise refused(f"does not say where {self.name(child)!r} lies in {self.name(parent)!r}")
         entity = self.file[relation]
         operator = entity["REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION"][0]
         first, second = entity["REPRESENTATION_RELATIONSHIP"][2:4]
@@ -222,13 +199,13 @@ class Assembly:
         if "SI_UNIT" in entity:
             prefix, name = entity["SI_UNIT"][-2:]
             if prefix not in PREFIXES:
-                raise self.file.unreadable(f"has the unit {prefix} {name}, which is not read")
+                raise refused(f"has the unit {prefix} {name}, which is not read")
             return PREFIXES[prefix] * (1e-3 if name == "GRAM" else 1.0)
         source = self.file[entity["CONVERSION_BASED_UNIT"][1]] if "CONVERSION_BASED_UNIT" in entity else entity
         for args in source.values():
             if args and isinstance(args[0], tuple):
                 return float(args[0][1][0]) * self.size(args[1])
-        raise self.file.unreadable(f"has a unit at #{unit} that is not read")
+        raise refused(f"has a unit at #{unit} that is not read")
 
     def solids(self, definition: int) -> tuple[list[tuple[Solid, Place]], int]:
         """The solids of a product in its frame, and the number of its surface bodies and meshes."""
@@ -297,13 +274,8 @@ class Assembly:
                 if "density" in label.lower():
                     measure = next((args for args in entity.values() if isinstance(args[-2:][0], tuple)), None)
                     if measure is not None:
-                        density = float(measure[-2][1][0]) * self._derived(measure[-1])
+                        density = float(measure[-2][1][0])
+                        for element in file.args(measure[-1], "DERIVED_UNIT")[0]:
+                            base, exponent = file.args(element, "DERIVED_UNIT_ELEMENT")
+                            density *= self.size(base) ** float(exponent)
         return density, material
-
-    def _derived(self, unit: Any) -> float:
-        """A unit of several factors in SI."""
-        size = 1.0
-        for element in self.file.args(unit, "DERIVED_UNIT")[0]:
-            base, exponent = self.file.args(element, "DERIVED_UNIT_ELEMENT")
-            size *= self.size(base) ** float(exponent)
-        return size

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 
-if TYPE_CHECKING:
-    from trunnion.exchange.formats import ImportOptions
-
-__all__ = ["Array", "Body", "Draft", "Pair", "Place", "components", "few", "free_name", "moved", "perpendicular",
-           "refused", "steiner", "united"]  # fmt: skip
+__all__ = ["MATERIALS", "Array", "Body", "Draft", "ImportOptions", "Pair", "Place", "components", "few", "free_name",
+           "moved", "perpendicular", "refused", "steiner", "united"]  # fmt: skip
 
 Array = NDArray[np.float64]
+MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
+             "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
 FARTHEST = 1e9  # m; what lies farther is a mistake of the file
 PARALLEL = 1e-6  # rad, between axes that count as parallel
 
@@ -37,6 +36,27 @@ def few(number: int, most: int, noun: str) -> None:
     """Refuse a file that holds more than a mechanism needs, before it fills the memory."""
     if number > most:
         raise refused(f"has {number:,} {noun}; at most {most:,} are read", remedy="export the mechanism alone")
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """How a file is read.
+
+    Parameters
+    ----------
+    ground : the part that does not move; found by the reader if empty.
+    density : kg/m³ of parts whose file states none.
+    gap : greatest difference of the radii of a pin and its hole that still is a joint, m.
+    drive : the joint that is driven; found by the reader if empty.
+    unit : length unit of a file that states none, in m; unit_stated : whether the user stated it.
+    """
+
+    ground: str = ""
+    density: float = MATERIALS["steel"]
+    gap: float = 0.5e-3
+    drive: str = ""
+    unit: float = 1e-3
+    unit_stated: bool = False
 
 
 @dataclass(frozen=True, eq=False)

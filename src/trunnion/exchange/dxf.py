@@ -20,13 +20,12 @@ from ezdxf import recover
 from ezdxf.lldxf.const import DXFError
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, free_name
 from trunnion.exchange.drawing import AUXILIARY
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
-    from trunnion.exchange.formats import ImportOptions
 
 __all__ = ["read"]
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Draft, few, refused
+from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, few, refused
 from trunnion.exchange.model_file import complete
 from trunnion.exchange.skeleton import positions_of
 from trunnion.files import reading, whole
@@ -26,10 +26,8 @@ from trunnion.model.units import KINDS, UnitError
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["FORMATS", "MATERIALS", "Format", "ImportOptions", "export_model", "import_file"]
+__all__ = ["FORMATS", "Format", "export_model", "import_file"]
 
-MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
-             "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
 LINKS = "http:/", "https:/"  # how a path begins that is a link: its text is read, nothing is fetched
 FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read
@@ -61,27 +59,6 @@ FORMATS: dict[str, Format] = {
     ".json": Format("pylinkage", "linkages"),
     ".fmu": Format("FMU", writes="fmu"),
 }
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """How a file is read.
-
-    Parameters
-    ----------
-    ground : the part that does not move; found by the reader if empty.
-    density : kg/m³ of parts whose file states none.
-    gap : greatest difference of the radii of a pin and its hole that still is a joint, m.
-    drive : the joint that is driven; found by the reader if empty.
-    unit : length unit of a file that states none, in m; unit_stated : whether the user stated it.
-    """
-
-    ground: str = ""
-    density: float = MATERIALS["steel"]
-    gap: float = 0.5e-3
-    drive: str = ""
-    unit: float = 1e-3
-    unit_stated: bool = False
 
 
 def _entry(path: Path, verb: str) -> tuple[Format, Any]:

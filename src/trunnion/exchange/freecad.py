@@ -22,8 +22,7 @@ from defusedxml.ElementTree import iterparse
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name
-from trunnion.exchange.formats import ImportOptions
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, ImportOptions, Pair, free_name
 
 __all__ = ["read"]
 

@@ -20,8 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from trunnion.errors import MechanismError
-from trunnion.exchange.draft import Array, Body, Draft, Pair, few, free_name, refused
-from trunnion.exchange.formats import ImportOptions
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
 from trunnion.model.names import nearest
 
 __all__ = ["read", "read_link"]

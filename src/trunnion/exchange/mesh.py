@@ -7,17 +7,14 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import trimesh
 from defusedxml import DefusedXmlException, ElementTree
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Array, Body, Draft, free_name
-
-if TYPE_CHECKING:
-    from trunnion.exchange.formats import ImportOptions
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, free_name
 
 __all__ = ["read"]
 

@@ -13,8 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Body, Draft, Pair, Place, refused, steiner, united
-from trunnion.exchange.formats import ImportOptions
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, Place, refused, steiner, united
 from trunnion.exchange.robots import (
     APART,
     WORLD,

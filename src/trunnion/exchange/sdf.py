@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, Place, refused
-from trunnion.exchange.formats import ImportOptions
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, ImportOptions, Pair, Place, refused
 from trunnion.exchange.robots import (
     WORLD,
     Scene,

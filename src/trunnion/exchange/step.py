@@ -19,8 +19,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.brep import Face, Moments, Solid
-from trunnion.exchange.draft import Array, Body, Draft, Place, free_name, refused
-from trunnion.exchange.formats import MATERIALS, ImportOptions
+from trunnion.exchange.draft import MATERIALS, Array, Body, Draft, ImportOptions, Place, free_name, refused
 from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.part21 import Part21, quoted

@@ -9,8 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Body, Draft, Pair, refused
-from trunnion.exchange.formats import ImportOptions
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, refused
 from trunnion.exchange.robots import APART, WORLD, laid_out, opening, parsed, text_of, written
 from trunnion.exchange.sdf import Reader, add_driver, add_joint, end_of
 from trunnion.exchange.skeleton import Positions

@@ -50,8 +50,7 @@ def compiled_side(job: Job, threads: int = 1) -> Side | None:
     """The same numbers by the compiled engine; None where Trunnion is not installed."""
     if not version("trunnion"):
         return None
-    from trunnion.engines.kernel import Lanes
-    from trunnion.solve.walk_kernel import WalkKernel
+    from trunnion.solve.walk_kernel import Lanes, WalkKernel
 
     mechanism = Mechanism.read(MODEL)
     prepared = prepare(mechanism.with_friction("off") if job == "frictionless" else mechanism)

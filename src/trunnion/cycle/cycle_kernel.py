@@ -17,7 +17,6 @@ from trunnion.algebra.namespace import Number
 from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, followed, like, margin_rows, stacked
 from trunnion.cycle.fill import COMPARED, CONDITIONS, Arrays, allocate, cells, fill_chunk, fill_errors
-from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.variables import OF_SOME_JOINTS, VARIABLES
 from trunnion.solve.backward import Backward
@@ -26,7 +25,7 @@ from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.switches import MARGINS, Mechanisms, accuracy_of, bends, breaks_between
 from trunnion.solve.system import Values
-from trunnion.solve.walk_kernel import Figure, WalkKernel
+from trunnion.solve.walk_kernel import Figure, Lanes, WalkKernel, lanes_of, literals, time_of
 
 __all__ = ["CycleKernel", "Engine", "Many", "compiles", "kernel_of"]
 

@@ -27,7 +27,7 @@ from trunnion.dynamics.motor import drives
 from trunnion.dynamics.rates import Dynamics, Layout, Rates, Seen, Walks, beside, bridged, seen
 from trunnion.dynamics.state import DIFFERENCE, NONE, FreeMotion, Held, Moment
 from trunnion.dynamics.touching import Closed, Onset
-from trunnion.engines.kernel import literals
+from trunnion.solve.walk_kernel import literals
 
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode

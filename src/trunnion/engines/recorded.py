@@ -16,8 +16,9 @@ import numpy as np
 from trunnion.algebra.namespace import Done, Step, Traced, UntraceableError
 from trunnion.engines.graph import BOTH, Graph
 
-__all__ = ["Recorded", "number_of"]
+__all__ = ["STRUCTURAL", "Recorded", "number_of"]
 
+STRUCTURAL = (0.0, 1.0, -1.0)  # numbers by which kernels save work: they are compiled in
 MOST_RECURRING = 64  # functions of numbers whose records are kept at hand
 _recurring: dict[Hashable, tuple[Graph, list[int]]] = {}
 OF_ALL_LANES: dict[Any, bool] = {np.any: True, np.all: False}  # the answers that no lane contradicts

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number, UntraceableError
 from trunnion.engines.graph import BOTH, Graph
-from trunnion.engines.kernel import STRUCTURAL, TIME
 from trunnion.engines.parts import Parts
-from trunnion.engines.recorded import Recorded
+from trunnion.engines.recorded import STRUCTURAL, Recorded
 from trunnion.solve.forward import Assembly, Forward, SpatialWalk, forward
 from trunnion.solve.loads import closes
 from trunnion.solve.system import System, Values
@@ -36,7 +35,7 @@ Pass = Callable[[Forward, Number], Any]  # gives a `Backward` of a walk in a dir
 MOST_CODES = 8  # of a system: numbers that are 0 or 1 are compiled in, and to record each choice of them takes seconds
 LATEST = "latest"  # among the codes of a system: the numbers that were asked for last, and what of them is compiled in
 MOST_FORMS = 16  # of mechanisms whose code is kept at hand
-DIRECTION = "direction"  # among the inputs of a code
+TIME, DIRECTION = "time", "direction"  # among the inputs of a code
 TRIED = np.array([0.0, 0.0137, 0.137, 1.37])  # s, at which code that was recorded of another mechanism is tried
 NUMBER = re.compile(r"[-+]?\.?\d[\d.]*([eE][-+]?\d+)?( [^-+*/^()]*)?$")  # with its unit, but no expression
 POINT = re.compile(r"links\.[^.]*\.(points\.[^.]*|centre)\.[xyz]$")

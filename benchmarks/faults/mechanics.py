@@ -405,7 +405,7 @@ _ENGINES = (
     ),
     Fault(
         "doubtful-lane-of-another-sample",
-        "engines/kernel.py",
+        "solve/walk_kernel.py",
         "return flat[rows] if len(flat) > 1",
         "return flat[0 * rows] if len(flat) > 1",
         ("tests/reference/test_compiled.py",),

@@ -367,16 +367,14 @@ def _plain(walk: Forward, module: Module) -> set[int]:
 def _never(system: System, module: Module) -> Finding:
     """Of a module that has no assembly."""
     links, plan, drivers = list(module.links), system.plan, len(system.mechanism.drivers)
-    named, remedy = f"links {', '.join(links)}", "check the lengths, or give a better assembly hint"
-    what = f"{named} cannot be assembled at any position of the cycle"
-    if not module.redundant:
-        return Finding.warning("assembly.never", "links", what, remedy, links=links)
-    if system.mechanism.has_errors:
-        what = f"{named} with their errors do not close as rigid parts at any position of the cycle"
+    what = f"links {', '.join(links)} cannot be assembled at any position of the cycle"
+    remedy, figures = "check the lengths, or give a better assembly hint", dict[str, Any](links=links)
+    if module.redundant and system.mechanism.has_errors:
+        what += " with their errors, as rigid parts"
         remedy = "they need play to fit together: see `trunnion assemble FILE` for how much"
-        return Finding.warning("assembly.never_rigid", "links", what, remedy, links=links)
-    spinning = f" ({len(plan.passive)} of them passive)" if plan.passive else ""
-    what += f"; the mobility is {plan.mobility} by Grübler's formula{spinning} and the number of drivers {drivers}"
-    remedy += "; so many constraints are consistent with special dimensions only: remove a driver or free a joint"
-    figures = {"links": links, "formula": plan.mobility, "drivers": drivers}
-    return Finding.warning("assembly.over_constrained", "links", what, remedy, **figures)
+    elif module.redundant:
+        spinning = f" ({len(plan.passive)} of them passive)" if plan.passive else ""
+        what += f"; the mobility is {plan.mobility} by Grübler's formula{spinning} and the number of drivers {drivers}"
+        remedy += "; so many constraints are consistent with special dimensions only: remove a driver or free a joint"
+        figures |= {"formula": plan.mobility, "drivers": drivers}
+    return Finding.warning("assembly.never", "links", what, remedy, **figures)

@@ -14,7 +14,7 @@ from trunnion.solve.assembly import grid, ways_of
 from trunnion.solve.forward import posed
 from trunnion.solve.hints import joint_rows, way_name
 from trunnion.solve.run import Run
-from trunnion.solve.track import Passing, Track
+from trunnion.solve.track import Track
 
 __all__ = ["AssemblyMode", "GroupModes", "choices", "put_together"]
 
@@ -70,14 +70,15 @@ def choices(run: Run) -> tuple[GroupModes, ...]:
         assembly, count = run.chosen.assembly[number], run.chosen.found[number]
         if count < 2:
             continue
-        if isinstance(assembly, Track):
+        branches = run.system.groups[number].BRANCHES
+        if not branches:
             lane, frames, branch = int(np.searchsorted(times, assembly.begin)), assembly.ways, assembly.taken
         else:
             first, frames = ways_of(walk, number, times)
             if first is None:
                 continue
-            here = int(assembly.branch(times[first])) if isinstance(assembly, Passing) else assembly
-            lane, branch = first, run.system.groups[number].BRANCHES.index(here)
+            here = assembly.sense(times[first]) if isinstance(assembly, Track) else assembly
+            lane, branch = first, branches.index(here)
         rows = joint_rows(walk, module, count, frames, lane)
         if not rows:
             continue

@@ -26,10 +26,8 @@ from trunnion.solve.track import (
     SAME,
     TOUCHING,
     Follower,
-    Passing,
     Track,
     TrackClock,
-    alternating,
     carried_on,
     key_of,
 )
@@ -197,9 +195,9 @@ def through(
     remarks = _findings(walk, module, met)
     if folding or not crossed:
         return branch, met, remarks
-    clock, duration = TrackClock.of(system, walk.values), cycle.duration if cycle.periodic else None
-    first = branch * int(alternating(crossed, times[lane]))
-    return Passing(first, tuple(crossed), duration, clock), met, remarks
+    clock, none = TrackClock.of(system, walk.values), np.zeros((0, len(times)))
+    track = Track(times, none, branch, cycle.periodic, clock, {}, float(times[lane]), passed=tuple(crossed))
+    return track, met, remarks
 
 
 def followed_through(

@@ -270,16 +270,12 @@ def remarks(
     if named is None:
         return [] if len(tied) == 1 else [undecided(walk, module, count, tied, frames, lane)]
     links, places = list(module.links), [name for _, name, _ in hints(walk, module)]
-    if not places:
+    if not places or len(tied) != 1 or tied[0] == named:
         return []
     key, (name, _) = next(iter(_names(walk.system, module).items()))
     what = f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by the place of "
-    what += ", ".join(places)
-    figures: dict[str, Any] = {"links": links, "places": places}
-    if len(tied) != 1 or tied[0] == named:
-        return [Finding.note("assembly.told_twice", f"assembly.{key}", what, "one is enough", **figures)]
-    what += f", which means {way_name(tied[0])}; the name is used"
-    figures |= {"way": way_name(tied[0]), "name": name}
+    what += f"{', '.join(places)}, which means {way_name(tied[0])}; the name is used"
+    figures = {"links": links, "places": places, "way": way_name(tied[0]), "name": name}
     return [Finding.warning("assembly.contradiction", f"assembly.{key}", what, "remove one of the two", **figures)]
 
 

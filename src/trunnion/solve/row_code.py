@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import fields, is_dataclass
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from operator import itemgetter
 from threading import Lock
 from typing import Any
@@ -332,11 +332,11 @@ def _opened(nest: Any) -> tuple[Sequence[Any], Callable[[Any], Any]] | None:
     if form is tuple or form is list:
         return nest, form
     if form is dict:
-        return list(nest.values()), partial(_dictionary, list(nest))
+        return list(nest.values()), lambda parts: dict(zip(nest, parts, strict=True))
     if isinstance(nest, tuple):
         return nest, form._make
     if is_dataclass(form):
-        return [getattr(nest, entry.name) for entry in fields(form)], partial(_unpacked, form)
+        return [getattr(nest, entry.name) for entry in fields(form)], lambda parts: form(*parts)
     return None
 
 
@@ -379,11 +379,3 @@ def _maker(nest: Any) -> Callable[[Any], Any]:
         return entries if form is tuple else lambda row: form(entries(row))
     makers = [_maker(part) for part in parts]
     return lambda row: form([maker(row) for maker in makers])
-
-
-def _dictionary(keys: list[Any], parts: Any) -> dict[Any, Any]:
-    return dict(zip(keys, parts, strict=True))
-
-
-def _unpacked(kind: Callable[..., Any], parts: Any) -> Any:
-    return kind(*parts)

@@ -21,8 +21,8 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "GUESSES", "SAME", "SEED", "TOUCHING", "Assemblies", "Follower", "Passing", "Track", "TrackClock", "alternating",
-    "at", "carried_on", "closed_at", "each_once", "extent", "guess_reaches", "key_of", "lane_of",
+    "GUESSES", "SAME", "SEED", "TOUCHING", "Assemblies", "Follower", "Track", "TrackClock", "alternating", "at",
+    "carried_on", "closed_at", "each_once", "extent", "guess_reaches", "key_of", "lane_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -194,8 +194,15 @@ class Follower:
         inside = ahead[: knots[through.shape[1] - 1]]
         if not len(inside):
             return through[:, :0]
-        knots = knots[: through.shape[1]]
-        solved, good = self._at(inside, _between_knots(knots, through, np.arange(1, len(inside) + 1)))
+        # guesses between the knots: cubic, with the slopes of the neighbours
+        knots, places = knots[: through.shape[1]], np.arange(1, len(inside) + 1)
+        slopes = np.gradient(through, knots, axis=1)
+        low = np.minimum(np.searchsorted(knots, places, side="right") - 1, len(knots) - 2)
+        width = knots[low + 1] - knots[low]
+        s = (places - knots[low]) / width
+        guess = through[:, low] * (1 + 2 * s) * (1 - s) ** 2 + through[:, low + 1] * s**2 * (3 - 2 * s)
+        guess = guess + width * (slopes[:, low] * s * (1 - s) ** 2 + slopes[:, low + 1] * s**2 * (s - 1))
+        solved, good = self._at(inside, guess)
         change = np.diff(solved, axis=1, prepend=q[:, None])
         bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
         most = limits(self.group, extent(self.group, at(self.elements, inside)))[:, None]
@@ -276,16 +283,6 @@ def _leading(good: NDArray[np.bool_]) -> int:
     return len(good) if good.all() else int(np.argmin(good))
 
 
-def _between_knots(knots: Places, columns: Array, places: Places) -> Array:
-    """Numbers, a column at each knot, at the places between: cubic, with the slopes of the neighbours."""
-    slopes = np.gradient(columns, knots, axis=1)
-    low = np.minimum(np.searchsorted(knots, places, side="right") - 1, len(knots) - 2)
-    width = knots[low + 1] - knots[low]
-    s = (places - knots[low]) / width
-    ends = columns[:, low] * (1 + 2 * s) * (1 - s) ** 2 + columns[:, low + 1] * s**2 * (3 - 2 * s)
-    return np.asarray(ends + width * (slopes[:, low] * s * (1 - s) ** 2 + slopes[:, low + 1] * s**2 * (s - 1)))
-
-
 def _mixed(number: Number, here: int, after: int, share: Array) -> Number:
     return number[here] + share * (number[after] - number[here]) if np.ndim(number) else number
 
@@ -308,12 +305,14 @@ def limits(group: Tree, size: float) -> Array:
 
 @dataclass(frozen=True)
 class Track:
-    """Free tree coordinates of a general group along the nominal cycle, and the sign of det J on its branch.
+    """An assembly along the nominal cycle: the coordinates of a general group, or a closed form that goes over to its
+    other branch at change points, so that its links move on smoothly.
 
-    times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled. turns: rotations, whole
-    turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. ways: frames of its
-    links in every assembly found at the time `begin`, s, in the order of their names; taken: which of them is followed.
-    passed: times of change points, s, at which det J changes its sign on the smooth way on.
+    times: (grid,) s; coordinates: free ones of the tree, (free, grid), NaN where the group cannot be assembled, none of
+    a closed form. orientation: sign of det J, or the branch, at the time `begin`, s. turns: rotations, whole turns
+    counted, that gear pairs ask for and the group does not hold, by their place in the drive. ways: frames of its links
+    in every assembly found at `begin`, in the order of their names; taken: which of them is followed. passed: times of
+    change points, s, at which the sign changes on the smooth way on.
     """
 
     times: Array
@@ -328,7 +327,7 @@ class Track:
     passed: tuple[float, ...] = ()
 
     def sense(self, moment: Number) -> Number:
-        """Sign of det J at times of the nominal cycle, s."""
+        """Sign of det J, or the branch, at times of the nominal cycle, s."""
         if not self.passed:
             return self.orientation
         again = alternating(self.passed, moment) * float(alternating(self.passed, np.float64(self.begin)))
@@ -342,9 +341,11 @@ class Track:
         walk: Forward,
         time: Number,
     ) -> Any:
-        """Pose by Newton from the track; NaN in the lanes that left its branch."""
+        """Pose, of a general group by Newton from the track; NaN in the lanes that left its branch."""
         moment = primal(self.clock.nominal(walk, time))
         moment = np.mod(moment, self.times[-1]) if self.periodic else moment
+        if group.BRANCHES:
+            return group.position(elements, self.sense(moment), drive)
         near = np.clip(np.searchsorted(self.times, moment), 1, len(self.times) - 1) if len(self.times) > 1 else 0
         between = _curved if self.passed else _interpolated  # beside a change point a guess must tell assemblies apart
         guess = [between(self.times, row, moment, near) for row in self.coordinates]
@@ -394,29 +395,6 @@ class TrackClock(NamedTuple):
         if not self.speed:
             return time * (self.duration / walk.system.span(walk.values, self.driver).duration)
         return (walk.system.drive(walk.values, self.driver, time)[0] - self.start) / self.speed
-
-
-@dataclass(frozen=True)
-class Passing:
-    """A closed form that goes over to its other assembly at change points, so that its links move on smoothly.
-
-    assembly: ±1 at the start of the nominal cycle; passed: times of the change points, s, rising; duration: of the
-    cycle that it comes back after, None if it does not.
-    """
-
-    assembly: int
-    passed: tuple[float, ...]
-    duration: float | None
-    clock: TrackClock
-
-    def branch(self, moment: Number) -> Number:
-        """±1 at times of the nominal cycle, s."""
-        moment = moment if self.duration is None else np.mod(moment, self.duration)
-        return self.assembly * alternating(self.passed, moment)
-
-    def pose(self, group: Any, elements: Sequence[Any], drive: Sequence[Number], walk: Forward, time: Number) -> Any:
-        """Pose in the assembly in which the links then are."""
-        return group.position(elements, self.branch(primal(self.clock.nominal(walk, time))), drive)
 
 
 def carried_on(times: Array, rows: Array, time: float) -> Array:

@@ -85,7 +85,8 @@ class WalkKernel:
         self.method, self.gravest, self.undefined = method or FrictionMethod(), gravest, undefined
         self.threads = threads or os.cpu_count() or 1
         self.again = 0
-        _check(run, self.method)
+        if reason := _by_numpy_alone(run, self.method):
+            raise _refusal(reason)
         request = described, list(figures), forces, self.method, gravest, sorted(undefined)
         laws = (law_of(run.system, joint).function.__module__ for joint in rubbing(run.system))
         keyed = described is not None and all(name.startswith("trunnion.") for name in laws)
@@ -103,8 +104,7 @@ class WalkKernel:
                 return run.solve(time, values, self.method)
             return Backward(forward(run.system, values, run.chosen.assembly, time), {})
         except UntraceableError as error:
-            what = f"this mechanism is not compiled: {error}"
-            raise MechanismError(Finding(what, "engine", "use the engine numpy")) from error
+            raise _refusal(str(error)) from error
 
     def curves(self, values: Values, time: Array) -> tuple[dict[str, Array], NDArray[np.int8]]:
         """Figures by name, and the status, both (sample, position).
@@ -220,23 +220,23 @@ class WalkKernel:
         return graph, [*curves, graph.node("byte", (graph.as_float(number_of(graph, status)),)), doubt]
 
 
-def _check(run: Run, method: FrictionMethod) -> None:
-    """MechanismError for what only NumPy does."""
-    remedy = "use the engine numpy"
+def _refusal(reason: str) -> MechanismError:
+    return MechanismError(Finding(f"this is not compiled: {reason}", "engine", "use the engine numpy"))
+
+
+def _by_numpy_alone(run: Run, method: FrictionMethod) -> str:
+    """What of a mechanism, or of what is asked of it, only NumPy does; empty if nothing."""
     if method.name != "newton" or method.criterion is not None or method.limit < STUBBORN:
-        what = "friction by successive approximation, or with a criterion or limit of its own, is not compiled"
-        raise MechanismError(Finding(what, "engine", remedy))
+        return "friction by successive approximation, or with a criterion or limit of its own"
     if run.system.inverse:
-        what = "a driver that moves another joint by its law is not compiled"
-        raise MechanismError(Finding(what, f"drivers.{next(iter(run.system.inverse.moves))}.moves", remedy))
+        return f"the driver {next(iter(run.system.inverse.moves))} moves another joint by its law"
     for module in run.system.plan.modules:
         if module.redundant:
-            what = f"the links {', '.join(module.links)} are over-constrained, which is solved by least squares"
-            raise MechanismError(Finding(f"{what}: that is not compiled", "engine", remedy))
+            return f"the links {', '.join(module.links)} are over-constrained, which is solved by least squares"
     for joint in rubbing(run.system):
         if law_of(run.system, joint).relaxation is not None:
-            what = f"the friction of {joint} has a memory along the cycle: that is not compiled"
-            raise MechanismError(Finding(what, f"joints.{joint}.friction", remedy))
+            return f"the friction of {joint} has a memory along the cycle"
+    return ""
 
 
 # ---- numbers of lanes -----------------------------------------------------------------------------------------------

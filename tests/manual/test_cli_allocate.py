@@ -25,19 +25,8 @@ QUICK = ("--steps", 24, "--samples", 100)
 @pytest.mark.slow
 def test_tables_and_files(program: Run, tmp_path: Path) -> None:
     files = ["a.csv", "a.measures.csv", "a.offers.csv", "a.json", "a.nc", "a.parquet", "a.svg", "a.png"]
-    code, out, err = program(
-        "allocate",
-        FOURBAR,
-        "--steps",
-        72,
-        "--samples",
-        100,
-        "--curve",
-        3,
-        *(f"--out={name}" for name in files),
-        "--report",
-        "a.html",
-    )
+    asked = ("--steps", 72, "--samples", 100, "--curve", 3, "--report", "a.html")
+    code, out, err = program("allocate", FOURBAR, *asked, *(f"--out={name}" for name in files))
     assert code == 0
     assert {path.name for path in tmp_path.iterdir()} == {*files, "a.html"}
     assert "worst case: cost 16.45688, as stated 17.054945, global optimum to first order" in out

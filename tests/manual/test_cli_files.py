@@ -17,13 +17,11 @@ import pytest
 import typer
 
 from manual.conftest import Run
-from manual.test_cli import EXAMPLES
+from manual.test_cli import EXAMPLES, FOUR_BAR
 from trunnion import read
 from trunnion.cli import app as cli
 from trunnion.cli.files import outputs
 from trunnion.cycle import analyse as analysing
-
-FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 
 
 @pytest.mark.parametrize("fault", [KeyError("x\ny"), RecursionError("too deep"), AssertionError(), MemoryError()])
@@ -47,8 +45,6 @@ def test_an_unforeseen_exception_is_one_line(
 def test_debug_shows_where(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
 ) -> None:
-    from trunnion.cli import app as cli
-
     def broken(*_: object, **__: object) -> None:
         raise KeyError("x")
 

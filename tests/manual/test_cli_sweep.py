@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 from pathlib import Path
@@ -14,33 +13,16 @@ import xarray as xr
 
 import trunnion
 from manual.conftest import Run
+from manual.test_cli import EXAMPLES, FOUR_BAR, files
+from manual.test_cli import table as rows
 from played import four_bar
 from trunnion.views.shown import figure_of as figure
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def files(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()}
 
 
 @pytest.mark.slow
 def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
-    done = program(
-        "sweep",
-        FOUR_BAR,
-        "--over",
-        "AB=1.6m:2.4m:3",
-        "--steps",
-        36,
-        *(f"--out=s{end}" for end in (".csv", ".nc", ".svg")),
-    )
+    written = [f"--out=s{end}" for end in (".csv", ".nc", ".svg")]
+    done = program("sweep", FOUR_BAR, "--over", "AB=1.6m:2.4m:3", "--steps", 36, *written)
     assert done.code == 0
     assert files(tmp_path) == {"s.csv", "s.nc", "s.svg"}
     for name in ("s.csv", "s.nc", "s.svg"):
@@ -138,14 +120,8 @@ def model(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_too_little_clearance(program: Run, model: Path, tmp_path: Path) -> None:
-    done = program(
-        "assemble",
-        model,
-        "--steps",
-        36,
-        *(f"--out=f{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")),
-        "--units-row",
-    )
+    written = [f"--out=f{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
+    done = program("assemble", model, "--steps", 36, *written, "--units-row")
     assert done.code == 1
     assert "0.0143451" in done.out
     assert "B 41 %" in done.out

@@ -88,38 +88,32 @@ QUICK = ("CONTRIBUTING.md", "groups-by-hand.md", "dual-algebra.md")
     ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_page(page: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names: dict[str, Any] = {"__name__": "page"}
-    shown = ""
-    for block in blocks(page):
+    for block, shown, statuses in worked_through(page, monkeypatch):
         where = f"{page.relative_to(ROOT)}:{block.line}"
-        if block.skip:
-            continue
-        if block.language == "python":
-            shown = printed_by_python(block.text, where, names)
-        elif block.language == "sh":
-            shown = _shell(block, where, monkeypatch)
+        if block.language == "sh":  # only the last may end with the status that the block declares
+            assert statuses == [0] * (len(statuses) - 1) + [block.exit] * bool(statuses), (
+                f"{where}: {statuses}\n{shown}"
+            )
         elif block.language == "text":
             compare(block.text, shown, where)
 
 
-def printed_by_python(text: str, where: str, names: dict[str, Any]) -> str:
-    """What the code prints."""
-    output = io.StringIO()
-    with contextlib.redirect_stdout(output):
-        exec(compile(text, where, "exec"), names)
-    return output.getvalue()
-
-
-def _shell(block: Block, where: str, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Output and findings of the `trunnion` commands of a block; only the last may end with the status it declares."""
-    commands = [line for line in block.text.splitlines() if line.startswith("trunnion ")]
-    output = ""
-    for number, command in enumerate(commands):
-        wanted = block.exit if number == len(commands) - 1 else 0
-        status, printed = run(command, monkeypatch)
-        assert status == wanted, f"{where}: {command}: exit status {status}, not {wanted}\n{printed}"
-        output += printed
-    return output
+def worked_through(page: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Block, str, list[int]]]:
+    """The blocks of a page in order, with what the code or the commands printed last, and exit statuses of commands."""
+    names: dict[str, Any] = {"__name__": "page"}
+    shown = ""
+    for block in (block for block in blocks(page) if not block.skip):
+        statuses: list[int] = []
+        if block.language == "python":
+            output = io.StringIO()
+            with contextlib.redirect_stdout(output):
+                exec(compile(block.text, f"{page.relative_to(ROOT)}:{block.line}", "exec"), names)
+            shown = output.getvalue()
+        elif block.language == "sh":
+            commands = [line for line in block.text.splitlines() if line.startswith("trunnion ")]
+            done = [run(command, monkeypatch) for command in commands]
+            statuses, shown = [status for status, _ in done], "".join(text for _, text in done)
+        yield block, shown, statuses
 
 
 def run(command: str, monkeypatch: pytest.MonkeyPatch) -> tuple[int, str]:

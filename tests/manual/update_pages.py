@@ -13,10 +13,9 @@ import tempfile
 from collections.abc import Sequence
 from difflib import SequenceMatcher
 from pathlib import Path
-from typing import Any
 
 import pytest
-from test_docs import PAGES, ROOT, Block, blocks, compare, printed_by_python, run
+from test_docs import PAGES, ROOT, blocks, compare, worked_through
 
 LEFT_OUT = "…"
 ALIKE = 0.4  # of the words of a line: less is another line
@@ -65,17 +64,11 @@ def _aligned(wanted: Sequence[str], given: Sequence[str]) -> list[int | None]:
 def update(page: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Rewrite the outputs of one page that do not hold; which commands failed or were updated."""
     text, told = page.read_text("utf-8"), []
-    names: dict[str, Any] = {"__name__": "page"}
-    shown = ""
-    for block in blocks(page):
+    for block, shown, statuses in worked_through(page, monkeypatch):
         where = f"{page.relative_to(ROOT)}:{block.line}"
-        if block.skip:
-            continue
-        if block.language == "python":
-            shown = printed_by_python(block.text, where, names)
-        elif block.language == "sh":
-            shown = _shell(block, where, monkeypatch, told)
-        elif block.language == "text":
+        if not {*statuses} <= {0, block.exit}:
+            told.append(f"{where}: exit statuses {statuses}\n{shown}")
+        if block.language == "text":
             try:
                 compare(block.text, shown, where)
             except AssertionError:
@@ -83,16 +76,6 @@ def update(page: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
                 text = text.replace(f"```text\n{block.text}```", f"```text\n{updated(block.text, shown)}```", 1)
     page.write_text(text, "utf-8")
     return told
-
-
-def _shell(block: Block, where: str, monkeypatch: pytest.MonkeyPatch, told: list[str]) -> str:
-    printed = ""
-    for command in (line for line in block.text.splitlines() if line.startswith("trunnion ")):
-        status, output = run(command, monkeypatch)
-        printed += output
-        if status not in (0, block.exit):
-            told.append(f"{where}: {command}: exit status {status}\n{output}")
-    return printed
 
 
 def main(names: Sequence[str]) -> None:

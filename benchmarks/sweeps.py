@@ -18,8 +18,8 @@ from rich.table import Table
 
 import trunnion
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.studies.sweep.grid import grid
-from trunnion.studies.sweep.points import AT_ONCE, Points
+from trunnion.studies.sweep import AT_ONCE, Points
+from trunnion.studies.sweep_grid import grid
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STEPS = 360

@@ -230,7 +230,7 @@ def _lay(folder: Path, models: dict[str, str]) -> None:
 def _call(command: str, folder: Path) -> None:
     """Run a command of Trunnion in this process: a process of its own takes seconds to load everything again."""
     from trunnion.cli.app import main
-    from trunnion.studies.sweep import study
+    from trunnion.studies import sweep as study
 
     said, status = io.StringIO(), 0
     streams = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)

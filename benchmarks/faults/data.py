@@ -23,7 +23,7 @@ _STATISTICS = (
     ),
     Fault(
         "deviation-by-the-number",
-        "statistics/moments.py",
+        "statistics/intervals.py",
         "np.sqrt(second * number / (number - 1))",
         "np.sqrt(second)",
         ("tests/statistics/test_intervals.py",),
@@ -45,8 +45,8 @@ _STATISTICS = (
     Fault(
         "replicates-without-student",
         "statistics/intervals.py",
-        "half = special.stdtrit(number - 1, (1 + confidence) / 2) * values.std",
-        "half = special.ndtri((1 + confidence) / 2) * values.std",
+        "half = special.stdtrit(number - 1, 1 - TAIL) * np.asarray(deviation)",
+        "half = special.ndtri(1 - TAIL) * np.asarray(deviation)",
         ("tests/statistics/test_intervals.py",),
     ),
 )
@@ -76,15 +76,15 @@ _STUDIES = (
     Fault(
         "allocation-drift-forgotten-on-one-side",
         "studies/allocation/solve.py",
-        "np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])",
-        "np.concatenate([(worst + drift)[keep[0]], worst[keep[1]]])",
+        "np.concatenate([(effects.linear + drift)[keep[0]], (effects.linear - drift)[keep[1]]])",
+        "np.concatenate([(effects.linear + drift)[keep[0]], effects.linear[keep[1]]])",
         ("tests/reference/test_allocation.py",),
     ),
     Fault(
-        "rss-is-a-sixth",
+        "margin-is-squared",
         "studies/allocation/problem.py",
-        "return self.spread() / 3 if self.deviation is None",
-        "return self.spread() / 6 if self.deviation is None",
+        "effects.linear @ tolerances + self.margins() * root",
+        "effects.linear @ tolerances + self.margins() ** 2 * root",
         ("tests/reference/test_allocation.py",),
     ),
     Fault(

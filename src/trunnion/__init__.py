@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from trunnion.studies.assembly import assemble
     from trunnion.studies.design import design
     from trunnion.studies.play import play
-    from trunnion.studies.sweep.study import sweep
+    from trunnion.studies.sweep import sweep
     from trunnion.studies.tolerance.study import tolerance
     from trunnion.views.shown import plot, report
 
@@ -49,7 +49,7 @@ _PLACES = {
     "rig": ("trunnion.rig", ""),
     "save": ("trunnion.results.save", "save"),
     "simulate": ("trunnion.dynamics.simulate", "simulate"),
-    "sweep": ("trunnion.studies.sweep.study", "sweep"),
+    "sweep": ("trunnion.studies.sweep", "sweep"),
     "tolerance": ("trunnion.studies.tolerance.study", "tolerance"),
 }
 _RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "simulate", "sweep", "tolerance"}

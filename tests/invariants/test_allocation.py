@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from allocations import bought, random_costs, rows
+from allocations import bought, random_costs, rows, solve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from trunnion.errors import Severity
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, SampledYield
-from trunnion.studies.allocation.solve import solve
 from trunnion.studies.allocation.yields import Verify
 
 COST, HALF_WIDTH = 1e-6, 1e-3  # the gap that is claimed, and its root: the cost is flat at its least
@@ -28,7 +27,9 @@ def case(seed: int, criterion: Criterion) -> AllocationProblem:
     """Six rows, four tolerances."""
     rng = np.random.default_rng(seed)
     return AllocationProblem(
-        bought(random_costs(rng, 4), most=0.3), rows(rng.normal(size=(6, 4)), rng.uniform(0.1, 0.5, 6)), criterion
+        bought(random_costs(rng, 4), most=0.3),
+        rows(rng.normal(size=(6, 4)), rng.uniform(0.1, 0.5, 6), criterion),
+        3.0 if criterion == "yield" else 1.0,
     )
 
 
@@ -45,10 +46,13 @@ def test_units(seed: int, criterion: Criterion, length: float, money: float) -> 
         given = one.cost.parameters
         cost = Cost(one.cost.model, {**given, "A": c * given["A"], "B": c * given["B"], "unit": a * given["unit"]})
         parts.append(replace(one, cost=cost, most=a * one.most))
-    assert problem.effects.half is not None
-    effects = rows(own * problem.effects.half / a, own[:, 0] * problem.effects.upper)
+    before = problem.effects
+    effects = replace(
+        before, linear=own * before.linear / a, spread=own * before.spread / a, upper=own[:, 0] * before.upper,
+        lower=own[:, 0] * before.lower,
+    )  # fmt: skip
     second = solve(replace(problem, contributions=tuple(parts), effects=effects))
-    assert second.tolerances == pytest.approx(a * first.tolerances, rel=HALF_WIDTH)
+    assert second.tolerances == pytest.approx(a * first.tolerances, rel=HALF_WIDTH, abs=1e-9 * a)
     assert second.cost == pytest.approx(c * first.cost, rel=COST)
     assert second.proven
 
@@ -78,8 +82,7 @@ def press(room: float, discrete: bool = False) -> AllocationProblem:
     labels = ("measures.stroke", "measures.torque")
     return AllocationProblem(
         parts,
-        replace(rows(effect, np.array([0.1, room * 0.0677])), labels=labels, lower=np.array([-0.1, -np.inf])),
-        "yield",
+        rows(effect, np.array([0.1, room * 0.0677]), "yield", labels=labels, lower=np.array([-0.1, -np.inf])),
     )
 
 
@@ -99,7 +102,7 @@ def sampled(problem: AllocationProblem, count: int = 100_000, seed: int = 5) -> 
     draws, others = np.random.default_rng(seed).normal(size=(2, count, len(problem.contributions)))
 
     def verify(t: Array, number: int) -> SampledYield:
-        moved = (draws if not number else others) @ (problem.effects.sigma() * t).T
+        moved = (draws if not number else others) @ (problem.effects.spread * t).T
         share = float(np.mean(np.all((moved <= problem.effects.upper) & (moved >= problem.effects.lower), axis=1)))
         half = 1.96 * float(np.sqrt(max(share * (1 - share), 1e-9) / count))
         return SampledYield(share, share - half, share + half)

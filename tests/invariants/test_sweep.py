@@ -16,9 +16,8 @@ import trunnion
 from manual.conftest import Run, program  # noqa: F401
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.studies.sweep.grid import grid as grid_of
-from trunnion.studies.sweep.points import Points
-from trunnion.studies.sweep.study import FIGURES
+from trunnion.studies.sweep import FIGURES, Points
+from trunnion.studies.sweep_grid import grid as grid_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CARDAN = EXAMPLES / "pezzuti-cardan.yaml"

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, RowEffects
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, RowEffects
+from trunnion.studies.allocation.solve import cheapest
+from trunnion.studies.allocation.yields import Verify, meet
 
 Array = NDArray[np.float64]
 FOUR_BAR = (100.0, 30.0, 90.0, 70.0)  # ground, crank, coupler, rocker, mm
@@ -45,13 +47,27 @@ def four_bar(
         Contribution(f"l{i + 1}", cost=Cost("power", {"B": price, "k": 0.45, "unit": 1.0}))
         for i, price in enumerate(PRICES)
     )
-    return AllocationProblem(bought, rows(effect, limit), criterion)
+    return AllocationProblem(bought, rows(effect, limit, criterion))
 
 
-def rows(effect: Array, limit: float | Array, **more: Any) -> RowEffects:
-    """Rows with limits ± limit."""
-    each = np.broadcast_to(np.asarray(limit, float), len(effect)).copy()
-    return RowEffects(np.abs(effect), -each, each, half=effect, **more)
+def rows(
+    effect: Array, limit: float | Array, criterion: Criterion = "worst-case", drift: Array | None = None, **more: Any
+) -> RowEffects:
+    """Rows with limits ± limit; standard deviations are a third of half widths, 3 of them what an RSS is."""
+    each, nothing = np.broadcast_to(np.asarray(limit, float), len(effect)).copy(), np.zeros_like(effect)
+    linear, spread = {"worst-case": (np.abs(effect), nothing), "rss": (nothing, effect)}.get(
+        criterion, (nothing, effect / 3)
+    )
+    drift = nothing if drift is None or criterion != "yield" else drift
+    more.setdefault("offset", np.zeros(len(effect)))
+    return RowEffects(linear, spread, drift, **{"lower": -each, "upper": each, **more})
+
+
+def solve(
+    problem: AllocationProblem, target: float | None = None, verify: Verify | None = None, sure: bool = False
+) -> Answer:
+    """The cheapest answer, with a yield if one is asked for."""
+    return cheapest(problem) if target is None else meet(problem, target, verify, sure)
 
 
 def bought(costs: list[Cost], **bounds: float) -> tuple[Contribution, ...]:

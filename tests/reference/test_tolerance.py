@@ -28,7 +28,7 @@ from toleranced import (
 )  # fmt: skip
 from toleranced import slider_crank as sized_slider
 from trunnion import Mechanism
-from trunnion.statistics.streams import uniforms
+from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.linear import study
 
 FAST = ("linear", "worst-case")

@@ -27,7 +27,7 @@ from toleranced import (
     slider_place,
 )  # fmt: skip
 from trunnion import Mechanism
-from trunnion.statistics.streams import SobolStream, uniforms
+from trunnion.statistics.draws import sobol, uniforms
 from trunnion.studies.tolerance.linear import study
 
 Law = Callable[[Array], Array]
@@ -58,7 +58,7 @@ def test_sample_by_sample(name: str, method: str) -> None:
     """The same uniform numbers through SciPy's quantiles and the closed form: the same figure, to 1e-12."""
     mechanism, of, at, laws = CASES[name]
     dims = len(laws)
-    u = uniforms(7, 3, dims, 700) if method == "plain" else SobolStream(7, 2, dims).points(0, 512)
+    u = uniforms(7, 3, dims, 700) if method == "plain" else sobol(7, 2, dims, 0, 512)
     own = of(*(value + law(row) for value, law, row in zip(at.values(), laws, u, strict=True)))
     np.testing.assert_allclose(figures(mechanism, u), own, rtol=0, atol=1e-12)
 
@@ -221,7 +221,7 @@ def test_sobol_points() -> None:
     mechanism = fourbar(measures=LIMITS)
     result = trunnion.tolerance(mechanism, methods=["quasi-monte-carlo"], samples=5000, seed=4)
     assert result["samples"].item() == 8 * 512
-    u = np.array([SobolStream(4, i, 4).points(0, 512) for i in range(8)])
+    u = np.array([sobol(4, i, 4, 0, 512) for i in range(8)])
     turn = study(mechanism).sampling("quasi-monte-carlo", 5000, 4).rotation
     assert turn is not None
     assert turn @ turn.T == pytest.approx(np.eye(4), abs=1e-14)

@@ -22,7 +22,7 @@ from trunnion.measures.positions import moved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.run import Run, prepare
-from trunnion.statistics.streams import uniforms
+from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.linear import study
 
 Array = NDArray[np.float64]

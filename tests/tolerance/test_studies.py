@@ -15,7 +15,7 @@ from mechanisms import Array
 from toleranced import FOURBAR, fourbar, fourbar_angle, many
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.results.attributes import findings_of
-from trunnion.statistics.streams import uniforms
+from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.linear import study
 
 LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}

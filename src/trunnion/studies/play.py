@@ -42,7 +42,7 @@ from trunnion.results.quantities import readable
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.space.determinacy import spins_of
-from trunnion.statistics.population import Population
+from trunnion.statistics.draws import Population
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.inputs import Inputs, plays_of
 from trunnion.studies.tolerance.linear import Table, ToleranceStudy, stated_or_outputs

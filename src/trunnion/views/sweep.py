@@ -25,7 +25,7 @@ from trunnion.results.quantities import SUPERSCRIPT, WORDS, prefixed
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.studies.sweep.study import FIGURES
+from trunnion.studies.sweep import FIGURES
 from trunnion.views.axis import Array, ease_of_status, usual_peak
 from trunnion.views.charts import (
     Axis,

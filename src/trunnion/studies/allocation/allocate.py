@@ -8,7 +8,8 @@ they stay the same. Then the mechanism is analysed with the tolerances found: wo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,18 +31,11 @@ from trunnion.studies.allocation.problem import (
     SampledYield,
     none,
 )
-from trunnion.studies.allocation.result import (
-    CLOSE,
-    DEFAULT_YIELD,
-    Allocated,
-    AllocationRequest,
-    Choice,
-    dataset,
-    share_of,
-)
+from trunnion.studies.allocation.result import CLOSE, DEFAULT_YIELD, Allocated, dataset, share_of
 from trunnion.studies.allocation.rows import Rows, rows_of
-from trunnion.studies.allocation.solve import solve, trade_off
-from trunnion.studies.tolerance.linear import ToleranceStudy
+from trunnion.studies.allocation.solve import cheapest
+from trunnion.studies.allocation.yields import meet
+from trunnion.studies.tolerance.linear import ToleranceStudy, study
 from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, check_share, sample, tolerance
 
 if TYPE_CHECKING:
@@ -65,7 +59,7 @@ def allocate(
     measures: Sequence[str] | None = None,
     criterion: Criterion = "worst-case",
     target: float | None = None,
-    choice: Choice = "auto",
+    choice: Literal["auto", "continuous", "discrete"] = "auto",
     steps: int = 360,
     at: float | str | None = None,
     samples: int = DEFAULT_SAMPLES,
@@ -117,32 +111,69 @@ def allocate(
     MechanismError
         Nothing has a cost, no measure a limit, or as `tolerance` does.
     """
-    if criterion != "yield" and (sure or target is not None):
-        where, what = ("sure", "only a yield can be sure") if target is None else ("yield", f"{criterion} has no yield")
-        raise MechanismError(Finding(what, where, "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
+    _check(criterion, target, sure, share, samples, curve)
+    names = _limited(mechanism, measures)
+    if not mechanism.costs:
+        remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
+        raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
+    absent = {
+        price.path: _start(price)
+        for price in mechanism.prices()
+        if price.play and not _clearance(mechanism, price.path)
+    }
+    start = study(mechanism.with_tolerances(absent), names, at, friction_method)
+    prices, notes = _prices(start)
+    before = {**_stated(start, prices), **{path: 0.0 for path in absent if path in prices}}
+    listed = next((path for path, price in prices.items() if price.choices), "")
+    if listed and choice == "continuous":
+        what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
+        raise MechanismError(Finding(what, f"costs.{listed}", remedy))
+    varying = start.inputs.names
+    rounds = _Rounds(
+        mechanism, varying, names, criterion, share, at, samples, seed, friction_method, jobs, sure, prices
+    )
+    settled = rounds.settled(start, {})
+    if exact and criterion == "worst-case":
+        settled = rounds.exact(settled)
+    answer = settled.answer
+
+    offers: list[tuple[float, Answer]] = []
+    for factor in np.geomspace(*RANGE, curve if answer.found else 0).tolist():  # of a yield with the margin that it has
+        effects = answer.problem.effects
+        wider = replace(effects, lower=factor * effects.lower, upper=factor * effects.upper)
+        as_stated = abs(factor - 1) < SAME
+        offers.append((factor, answer if as_stated else cheapest(replace(answer.problem, effects=wider))))
+    what = "the measure has no first-order result: its limits were ignored in the allocation"
+    remedy = "check with the samples whether they are met"
+    notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in settled.rows.unknown]
+    kind = "discrete" if listed or choice == "discrete" else "continuous"
+    notes += settled.findings
+    allocated = Allocated(criterion, share, settled.study, settled.rows, answer, kind, prices, before, notes, offers)
+    methods: list[Method] = ["linear"]
+    if answer.found:
+        mechanism = mechanism.with_tolerances(allocated.bought)
+        methods += ["worst-case", "monte-carlo"] if samples else ["worst-case"]
+    toleranced = tolerance(
+        mechanism, names, methods, max(samples, 1), seed, steps, at, friction_method=friction_method, jobs=jobs,
+        progress=progress,
+    )  # fmt: skip
+    return dataset(allocated, toleranced)
+
+
+def _check(criterion: Criterion, target: float | None, sure: bool, share: float, samples: int, curve: int) -> None:
+    """MechanismError with what is wrong with the question."""
     findings = check_share(share)
+    if criterion != "yield" and target is not None:
+        findings.append(Finding(f"{criterion} has no yield", "yield", "leave it out, or use the criterion yield"))
+    elif criterion != "yield" and sure:
+        findings.append(Finding("only a yield can be sure", "sure", "leave it out, or use the criterion yield"))
     if samples < 0:
         findings.append(Finding(f"{samples} samples", "samples", "give a number from 0"))
     if not (curve == 0 or 2 <= curve <= MOST_FACTORS):
         findings.append(Finding(f"a curve of {curve} points", "curve", f"give 2 to {MOST_FACTORS}"))
     if findings:
         raise MechanismError(findings)
-    request = AllocationRequest(
-        mechanism, _limited(mechanism, measures), criterion, share, choice, steps, at, samples, seed, friction_method,
-        jobs, curve, exact, sure,
-    )  # fmt: skip
-    allocated = _allocated(request)
-    with_them = mechanism.with_tolerances(allocated.bought) if allocated.answer.found else mechanism
-    names = [measure.name for measure in allocated.study.measures]
-    methods: list[Method] = ["linear", "worst-case"] if allocated.answer.found else ["linear"]
-    if samples and allocated.answer.found:
-        methods.append("monte-carlo")
-    toleranced = tolerance(
-        with_them, names, methods, max(samples, 1), seed, steps, at,
-        friction_method=friction_method, jobs=jobs, progress=progress,
-    )  # fmt: skip
-    return dataset(allocated, toleranced)
 
 
 def half_widths(result: xr.Dataset) -> dict[str, float]:
@@ -225,114 +256,113 @@ def _stated(study: ToleranceStudy, prices: Mapping[str, Price]) -> dict[str, flo
 # ---- rounds ---------------------------------------------------------------------------------------------------
 
 
-def _allocated(request: AllocationRequest) -> Allocated:
-    """The allocation, with effects that belong to the tolerances found."""
-    mechanism = request.mechanism
-    if not mechanism.costs:
-        remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
-        raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
-    absent = {
-        price.path: _start(price)
-        for price in mechanism.prices()
-        if price.play and not _clearance(mechanism, price.path)
-    }
-    now = request.studied(absent)
-    prices, notes = _prices(now)
-    before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
-    listed = next((path for path, price in prices.items() if price.choices), "")
-    if listed and request.choice == "continuous":
-        what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
-        raise MechanismError(Finding(what, f"costs.{listed}", remedy))
+class Settled(NamedTuple):
+    """An answer with the rows that it keeps, and the study of its own tolerances."""
 
-    tight: dict[str, float] = {}
-    answer, now, rows, more = _settled(request, prices, now, tight)
-    for _ in range(ROUNDS if request.exact and request.criterion == "worst-case" else 0):
-        excess = {} if not answer.found else _excess(now)
-        if max(excess.values(), default=0.0) <= 1 + CLOSE:
-            break
-        for name, share in excess.items():
-            if share > 1:  # limits are narrowed until the worst case on the mechanism keeps the stated ones
-                tight[name] = tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
-        answer, now, rows, more = _settled(request, prices, now, tight)
-
-    offers: list[tuple[float, Answer]] = []
-    if request.curve and answer.found:
-        factors: list[float] = np.geomspace(*RANGE, request.curve).tolist()  # of a yield with the margin that it has
-        wider = trade_off(answer.problem, factors)
-        offers = [
-            (factor, answer if abs(factor - 1) < SAME else each) for factor, each in zip(factors, wider, strict=True)
-        ]
-    what = "the measure has no first-order result: its limits were ignored in the allocation"
-    remedy = "check with the samples whether they are met"
-    notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in rows.unknown]
-    kind = "discrete" if listed or request.choice == "discrete" else "continuous"
-    return Allocated(request, now, rows, answer, kind, prices, before, (*notes, *more), tuple(offers))
+    answer: Answer
+    study: ToleranceStudy
+    rows: Rows
+    findings: Sequence[Finding] = ()
 
 
-def _settled(
-    request: AllocationRequest, prices: Mapping[str, Price], now: ToleranceStudy, tight: Mapping[str, float]
-) -> tuple[Answer, ToleranceStudy, Rows, list[Finding]]:
-    """The answer with rows taken at its own tolerances, in rounds from those of a study: with that study and the rows.
+@dataclass(frozen=True)
+class _Rounds:
+    """What is asked for, see `allocate`, paths of all that varies, and what can be bought of it."""
 
-    Rows that move stay in the problem, so that the answer keeps all that they were.
-    """
-    contributions = tuple(
-        _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in now.inputs.names
-    )
-    rows = everything = rows_of(now, _stated(now, prices), request.criterion, tight)
-    for count in range(ROUNDS):
-        everything = rows.with_moving(everything) if count else rows
-        problem = AllocationProblem(contributions, everything.effects, request.criterion)
-        outside = _nominal_outside(now)
-        answer = none(problem, outside) if outside else _solved(request, prices, problem)
-        if not answer.found:
-            return answer, now, everything, []
-        bought = {name: t for name, t in answer.by_name.items() if name in prices}
-        after = request.studied(bought)
-        ahead = rows_of(after, bought, request.criterion, tight)
-        if _same(answer, rows, ahead):
-            return answer, after, everything, []
-        rows, last, now = ahead, now, after
-    what = f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations"
-    doubt = Finding.warning("allocation.unsettled", "costs", what, "use the verification", rounds=ROUNDS)
-    return answer, last, everything, [doubt]
+    mechanism: Mechanism
+    names: Sequence[str]
+    measures: Sequence[str]
+    criterion: Criterion
+    target: float
+    at: float | str | None
+    samples: int
+    seed: int
+    friction: FrictionMethod | None
+    jobs: int | None
+    sure: bool
+    prices: Mapping[str, Price]
+
+    def studied(self, tolerances: Array) -> tuple[ToleranceStudy, dict[str, float]]:
+        """First order of the mechanism with half widths (contribution,), and those that are bought, by path."""
+        pairs = zip(self.names, tolerances.tolist(), strict=True)
+        bought = {name: t for name, t in pairs if name in self.prices}
+        return study(self.mechanism.with_tolerances(bought), self.measures, self.at, self.friction), bought
+
+    def solved(self, problem: AllocationProblem) -> Answer:
+        """The answer of a problem; of a yield that of the samples."""
+        if self.criterion != "yield":
+            return cheapest(problem)
+
+        def verify(tolerances: Array, number: int) -> SampledYield:
+            job = self.studied(tolerances)[0].sampling(
+                "monte-carlo", self.samples, self.seed + FRESH * number, "auto", steps=1
+            )
+            passed = np.all(sample(job, self.jobs)[0].passed, axis=0)
+            return SampledYield(float(np.mean(passed)), *map(float, intervals.share(np.sum(passed), len(passed))))
+
+        return meet(problem, self.target, verify if self.samples else None, self.sure)
+
+    def settled(self, now: ToleranceStudy, tight: Mapping[str, float]) -> Settled:
+        """The answer with rows taken at its own tolerances, in rounds from those of a study.
+
+        Rows that move stay in the problem, so that the answer keeps all that they were. tight: what the limits of a
+        measure are multiplied by.
+        """
+        contributions = tuple(_contribution(name, self.prices.get(name)) for name in now.inputs.names)
+        rows = everything = rows_of(now, _stated(now, self.prices), self.criterion, tight)
+        for count in range(ROUNDS):
+            everything = rows.with_moving(everything) if count else rows
+            problem = AllocationProblem(contributions, everything.effects)
+            outside = _nominal_outside(now)
+            answer = none(problem, outside) if outside else self.solved(problem)
+            if not answer.found:
+                return Settled(answer, now, everything)
+            after, bought = self.studied(answer.tolerances)
+            ahead = rows_of(after, bought, self.criterion, tight)
+            if _same(answer, rows, ahead):
+                return Settled(answer, after, everything)
+            rows, last, now = ahead, now, after
+        what = f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations"
+        doubt = Finding.warning("allocation.unsettled", "costs", what, "use the verification", rounds=ROUNDS)
+        return Settled(answer, last, everything, [doubt])
+
+    def exact(self, settled: Settled) -> Settled:
+        """The same with limits narrowed until the worst case that is found on the mechanism keeps the stated ones."""
+        tight: dict[str, float] = {}
+        for _ in range(ROUNDS):
+            if not settled.answer.found:
+                break
+            excess = {}
+            for order, corners in zip(settled.study.orders, settled.study.worst(), strict=True):
+                shares = (share_of(end.value, limit) for end, limit in zip(corners, order.limits, strict=True))
+                excess[order.measure.name] = max(shares)
+            if max(excess.values()) <= 1 + CLOSE:
+                break
+            for name, share in excess.items():
+                if share > 1:
+                    tight[name] = tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
+            settled = self.settled(settled.study, tight)
+        return settled
 
 
-def _contribution(price: Price) -> Contribution:
+def _contribution(name: str, price: Price | None) -> Contribution:
+    """What a number may be; its whole tolerance where it has no cost."""
+    if price is None:
+        return Contribution(name, 1.0)
     cost = Cost(price.model, price.parameters) if price.model else None
-    return Contribution(price.path, 0.0, cost, price.choices, price.group, price.least, price.most)
-
-
-def _solved(request: AllocationRequest, prices: Mapping[str, Price], problem: AllocationProblem) -> Answer:
-    """The answer of a problem; of a yield that of the samples."""
-
-    def verify(tolerances: Array, number: int) -> SampledYield:
-        pairs = zip(problem.contributions, tolerances.tolist(), strict=True)
-        bought = {contribution.name: t for contribution, t in pairs if contribution.name in prices}
-        seed = request.seed + FRESH * number
-        job = request.studied(bought).sampling("monte-carlo", request.samples, seed, "auto", steps=1)
-        passed = np.all(sample(job, request.jobs)[0].passed, axis=0)
-        return SampledYield(float(np.mean(passed)), *map(float, intervals.share(np.sum(passed), len(passed))))
-
-    return solve(problem, request.target, verify if request.samples else None, request.sure)
+    return Contribution(name, 0.0, cost, price.choices, price.group, price.least, price.most)
 
 
 def _same(answer: Answer, rows: Rows, ahead: Rows) -> bool:
     """Whether the rows at the tolerances found take as much of their room as those they were found with."""
     if len(ahead.measure) != len(rows.measure):
         return False
-    before, after = (answer.problem.with_effects(at.effects).used(answer.tolerances) for at in (rows, ahead))
+    caps = None if answer.problem.caps is None else answer.problem.caps[: len(rows.measure)]
+    before, after = (
+        replace(answer.problem, effects=each.effects, caps=caps).used(answer.tolerances) for each in (rows, ahead)
+    )
     still = ~rows.moving
     return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
-
-
-def _excess(now: ToleranceStudy) -> dict[str, float]:
-    """The worst case that is found on the mechanism, as a share of the limit it is nearest to, by measure."""
-    shares = {}
-    for order, (least, most) in zip(now.orders, now.worst(), strict=True):
-        lower, upper = order.limits
-        shares[order.measure.name] = max(share_of(least.value, lower), share_of(most.value, upper))
-    return shares
 
 
 def _nominal_outside(now: ToleranceStudy) -> list[Finding]:

@@ -1,11 +1,12 @@
 """What tolerances to buy: the least cost that keeps every measure within its limits. The problem and its answer.
 
 Unknown are the half widths t of the contributions (of a clearance: the radial clearance). Every row is one measure at
-one position, with a limit on either side of its nominal. With effects per unit of t the criteria are
+one position, with a limit on either side of its nominal. What it comes to is
 
-    worst case   offset ± Σ worst_i t_i                              within the limits
-    rss          offset ± √(Σ (half_i t_i)²)                         within the limits
-    yield        offset + Σ mean_i t_i ± z √(Σ (deviation_i t_i)²)   within the limits, z so that the yield is met
+    offset + Σ drift_i t_i ± (Σ linear_i t_i + z √(Σ (spread_i t_i)²))    within the limits
+
+of which each criterion takes a part: the worst case is linear, RSS a spread with z = 1, and a yield has spread and
+drift of normal deviations, z so that the yield is met.
 
 All of them, and the costs, are convex in t: a point at which the conditions of Karush, Kuhn and Tucker hold is the
 global optimum. The answer carries a lower bound of the cost that proves it.
@@ -14,7 +15,7 @@ global optimum. The answer carries a lower bound of the cost that proves it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -67,78 +68,46 @@ class Contribution:
 
 @dataclass(frozen=True)
 class RowEffects:
-    """What each contribution does to each row, per unit of its half width: arrays (row, contribution).
+    """What each contribution does to each row, per unit of its half width: arrays (row, contribution), or (row,).
 
-    lower, upper: limits of the deviation from the nominal, (row,), infinite where there is none; offset: deviation of
-    the middle of the tolerances, (row,). worst: |∂y/∂p|, of a clearance |Q₁| + |Q₂|; half: what RSS squares, worst if
-    None; deviation, mean: standard deviation and mean, half/3 and 0 if None; correlation: (contribution,
-    contribution). half and deviation are signed: that matters with correlation, and for a yield.
-    labels, places, units: of the rows for messages: names, where in the cycle (" at 60°"), and SI units.
+    lower, upper: limits of the deviation from the nominal, infinite where there is none; offset: deviation of the
+    middle of the tolerances. linear, spread, drift: see above; the spread is signed, which matters with a correlation,
+    (contribution, contribution). labels, places, units: of the rows for messages: names, where in the cycle
+    (" at 60°"), and SI units.
     """
 
-    worst: Array
+    linear: Array
+    spread: Array
+    drift: Array
     lower: Array
     upper: Array
-    half: Array | None = None
-    deviation: Array | None = None
-    mean: Array | None = None
-    offset: Array | None = None
+    offset: Array
     correlation: Array | None = None
     labels: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
 
-    def say(self, row: int, value: float) -> str:
-        """A deviation of a row with its sign and unit, angles in degrees, lengths in mm."""
-        factor, unit = drawn_in(value, self.units[row]) if self.units else (1.0, "")
-        return signed(value, factor, unit, digits=6)
-
-    def spread(self) -> Array:
-        """What RSS squares."""
-        return self.worst if self.half is None else self.half
-
-    def sigma(self) -> Array:
-        """Standard deviation of a row per unit of each half width, signed, (row, contribution)."""
-        return self.spread() / 3 if self.deviation is None else self.deviation
-
-    def drift(self) -> Array:
-        """Mean of a row per unit of each half width, (row, contribution)."""
-        return np.zeros_like(self.worst) if self.mean is None else self.mean
-
-    def middle(self) -> Array:
-        """Deviation of the middle of the tolerances, (row,)."""
-        return np.zeros(len(self.worst)) if self.offset is None else self.offset
-
-    def scaled(self, factor: float) -> RowEffects:
-        """With all limits times a factor."""
-        return replace(self, lower=factor * self.lower, upper=factor * self.upper)
-
 
 @dataclass(frozen=True)
 class AllocationProblem:
-    """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for.
+    """Contributions and their effects; z: how many standard deviations of room a yield asks for.
 
     caps: the largest margin that each row can have, (row,), infinite where there is no end to it; None: not looked at.
     """
 
     contributions: tuple[Contribution, ...]
     effects: RowEffects
-    criterion: Criterion = "worst-case"
-    z: float = 3.0
+    z: float = 1.0
     caps: Array | None = None
 
     def margins(self) -> Array:
-        """Standard deviations of room that `yield` asks of each row, (row,).
+        """Standard deviations of room that is asked of each row, (row,).
 
         They are z, but where a row cannot have z, as what is not bought takes up most of its room, they stay below
         its cap: (z⁻ⁿ + cap⁻ⁿ)^(−1/n). However large z, there are half widths with such margins.
         """
-        factors = np.full(len(self.effects.worst), self.z)
+        factors = np.full(len(self.effects.offset), self.z)
         return factors if self.caps is None else factors * (1 + (factors / self.caps) ** BENT) ** (-1 / BENT)
-
-    def with_effects(self, effects: RowEffects) -> AllocationProblem:
-        """The same with other effects of its rows, or of the first ones of them alone."""
-        return replace(self, effects=effects, caps=None if self.caps is None else self.caps[: len(effects.worst)])
 
     def groups(self) -> dict[str, list[Contribution]]:
         """What is bought together, by the name of the group, or of the one contribution."""
@@ -166,25 +135,17 @@ class AllocationProblem:
         pairs = zip(self.contributions, tolerances.tolist(), strict=True)
         return np.array([contribution.cost.value(t) if contribution.cost else 0.0 for contribution, t in pairs])
 
-    def at(self, tolerances: Array) -> tuple[Array, Array]:
-        """Least and largest deviation of each row that the criterion reckons with, (row,) each."""
-        middle, half = self.extent(tolerances)
-        return middle - half, middle + half
-
     def extent(self, tolerances: Array) -> tuple[Array, Array]:
         """Middle and half width of each row's range, (row,) each."""
         effects = self.effects
-        if self.criterion == "worst-case":
-            return effects.middle(), effects.worst @ tolerances
-        if self.criterion == "rss":
-            return effects.middle(), _norm(effects.spread() * tolerances, effects.correlation)
-        drift = effects.middle() + effects.drift() @ tolerances
-        return drift, self.margins() * _norm(effects.sigma() * tolerances, effects.correlation)
+        parts = effects.spread * tolerances
+        turned = parts if effects.correlation is None else parts @ effects.correlation
+        root = np.sqrt(np.maximum(np.einsum("ri,ri->r", parts, turned), 0.0))
+        return effects.offset + effects.drift @ tolerances, effects.linear @ tolerances + self.margins() * root
 
     def used(self, tolerances: Array) -> Array:
         """Share of its room that each row takes, (row,): above 1 breaks a limit."""
-        middle, half = self.extent(tolerances)
-        base, effects = self.effects.middle(), self.effects
+        (middle, half), effects, base = self.extent(tolerances), self.effects, self.effects.offset
         room = np.stack([effects.upper - base, base - effects.lower])
         taken = np.stack([middle - base + half, base - middle + half])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -212,11 +173,9 @@ class Trial(NamedTuple):
 class Answer:
     """Half widths to buy, or why there are none (`findings` with an error, NaN).
 
-    tolerances, costs: by contribution, m or rad; a fixed one costs nothing. choices: names of the options taken.
-    bound: no allocation costs less than this; gap: cost minus bound, a share of the cost that tolerances change.
-    proven: whether the gap proves a global optimum.
-    price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
-    used: share of its room each row takes.
+    tolerances, costs: by contribution, m or rad; a fixed one costs nothing. bound: no allocation costs less than this;
+    gap: cost minus bound, a share of the cost that tolerances change. price: what one more unit (rad, m, …) of a row's
+    room would save, (row,); NaN for a discrete choice. choices: names of the options taken.
     Of a yield: expected, of normal deviations, linearly; sampled, by those samples that chose the margin; checked, by
     fresh ones, which had no part in it; trials: all margins that were tried.
     """
@@ -224,12 +183,10 @@ class Answer:
     problem: AllocationProblem
     tolerances: Array
     costs: Array
-    cost: float
     bound: float
     gap: float
-    proven: bool
+    price: Array
     choices: dict[str, str] = field(default_factory=dict)
-    price: Array = field(default_factory=lambda: np.zeros(0))
     findings: tuple[Finding, ...] = ()
     expected: float = np.nan
     sampled: SampledYield | None = None
@@ -237,9 +194,19 @@ class Answer:
     trials: tuple[Trial, ...] = ()
 
     @property
+    def cost(self) -> float:
+        """That of all tolerances."""
+        return float(np.sum(self.costs))
+
+    @property
     def found(self) -> bool:
         """Whether there is an allocation."""
         return bool(np.isfinite(self.cost))
+
+    @property
+    def proven(self) -> bool:
+        """Whether the gap proves a global optimum."""
+        return self.gap <= PROVEN
 
     @property
     def used(self) -> Array:
@@ -262,19 +229,8 @@ def common_options(members: Sequence[Contribution]) -> dict[str, list[ProcessCho
 
 def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:
     """The answer that there is none."""
-    lost, no_price = np.full(len(problem.contributions), np.nan), np.full(len(problem.effects.worst), np.nan)
-    return Answer(problem, lost, lost, np.nan, np.nan, np.nan, False, {}, no_price, tuple(findings))
-
-
-def optimum(
-    problem: AllocationProblem, tolerances: Array, costs: Array, bound: float, gap: float, price: Array,
-    choices: dict[str, str],
-) -> Answer:  # fmt: skip
-    """The answer of a solver, with a doubt where its gap proves no global optimum."""
-    cost, proven = float(np.sum(costs)), gap <= PROVEN
-    what, remedy = f"the optimality gap is {gap:.1e} of the cost of the tolerances", "check the orders of magnitude"
-    doubts = () if proven else (Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=gap),)
-    return Answer(problem, tolerances, costs, cost, min(bound, cost), gap, proven, choices, price, doubts)
+    lost, no_price = np.full(len(problem.contributions), np.nan), np.full(len(problem.effects.offset), np.nan)
+    return Answer(problem, lost, lost, np.nan, np.nan, no_price, findings=tuple(findings))
 
 
 def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
@@ -284,25 +240,25 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
     """
     used, effects, findings = problem.used(least), problem.effects, []
     labels, places = (np.array(texts or [""] * len(used)) for texts in (effects.labels, effects.places))
-    broken, (low, high) = used > 1 + ALLOWED, problem.at(least)
+    broken, (middle, half) = used > 1 + ALLOWED, problem.extent(least)
+    low, high = middle - half, middle + half
+
+    def say(row: int, deviation: float) -> str:
+        factor, unit = drawn_in(deviation, effects.units[row]) if effects.units else (1.0, "")
+        return signed(deviation, factor, unit, digits=6)
+
     for label in dict.fromkeys(labels[broken].tolist()):
         row = int(np.argmax(np.where(labels == label, used, -np.inf)))
         upwards = high[row] - effects.upper[row] >= effects.lower[row] - low[row]
         over, limit = (high[row], effects.upper[row]) if upwards else (low[row], effects.lower[row])
-        largest = problem.contributions[int(np.argmax(effects.worst[row] * least))]
+        largest = problem.contributions[int(np.argmax((effects.linear + np.abs(effects.spread))[row] * least))]
         narrow = f"narrow '{largest.name}', which has no cost and" * largest.fixed
         narrow = narrow or f"allow '{largest.name}' a smaller least: it"
-        what = f"the limit {effects.say(row, limit)} is infeasible: with all tolerances at their least the deviation "
-        what += f"is {effects.say(row, over)}{places[row]}"
-        if problem.criterion == "yield":
+        what = f"the limit {say(row, limit)} is infeasible: with all tolerances at their least the deviation "
+        what += f"is {say(row, over)}{places[row]}"
+        if problem.caps is not None:
             what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
         remedy, figures = f"widen the limit, or first {narrow} has the largest share", {"limit": limit, "takes": over}
         where = label or f"row {row + 1}"
         findings.append(Finding.error("allocation.impossible", where, what, remedy, **figures, largest=largest.name))
     return findings
-
-
-def _norm(parts: Array, correlation: Array | None) -> Array:
-    """√(vᵀ C v) of each row of parts, (row,)."""
-    turned = parts if correlation is None else parts @ correlation
-    return np.asarray(np.sqrt(np.maximum(np.einsum("ri,ri->r", parts, turned), 0.0)), float)

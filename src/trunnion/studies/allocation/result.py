@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity
-from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
 from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.scales import scales_in
-from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows, used_curve
-from trunnion.studies.tolerance.linear import ToleranceStudy, study
+from trunnion.studies.tolerance.linear import ToleranceStudy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,14 +29,11 @@ __all__ = [
     "DEFAULT_YIELD",
     "VARIABLES",
     "Allocated",
-    "AllocationRequest",
-    "Choice",
     "dataset",
     "share_of",
 ]
 
 Array = NDArray[np.float64]
-Choice = Literal["auto", "continuous", "discrete"]
 DEFAULT_YIELD = 0.9973
 CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought
 TWICE = 2.0  # so many rejects as an RSS stands for are an error
@@ -81,48 +76,24 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
-@dataclass(frozen=True)
-class AllocationRequest:
-    """What was asked for; see `allocate`. measures: those with limits; target: the yield, for that criterion."""
-
-    mechanism: Mechanism
-    measures: Sequence[str]
-    criterion: Criterion
-    target: float
-    choice: Choice
-    steps: int
-    at: float | str | None
-    samples: int
-    seed: int
-    friction: FrictionMethod | None
-    jobs: int | None
-    curve: int
-    exact: bool
-    sure: bool
-
-    def studied(self, bought: Mapping[str, float]) -> ToleranceStudy:
-        """First order of the mechanism with these half widths and clearances, by path."""
-        mechanism = self.mechanism.with_tolerances(bought)
-        return study(mechanism, self.measures, self.at, self.friction)
-
-
 @dataclass(frozen=True, eq=False)
 class Allocated:
-    """What was found. study: of the tolerances that the rows of the answer belong to; way: how it was solved.
+    """What was found. study: of the tolerances that the rows of the answer belong to; kind: of the choice.
 
-    prices: of what could be bought, by path; before: half widths as stated; offers: factors of all limits with their
-    answers.
+    target: the yield, for that criterion; prices: of what could be bought, by path; before: half widths as stated;
+    offers: factors of all limits with their answers.
     """
 
-    asked: AllocationRequest
+    criterion: Criterion
+    target: float
     study: ToleranceStudy
     rows: Rows
     answer: Answer
-    way: str
+    kind: str
     prices: Mapping[str, Price]
     before: Mapping[str, float]
-    findings: tuple[Finding, ...]
-    offers: tuple[tuple[float, Answer], ...] = ()
+    findings: Sequence[Finding]
+    offers: Sequence[tuple[float, Answer]] = ()
 
     @property
     def bought(self) -> dict[str, float]:
@@ -153,9 +124,9 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
     attributes: dict[str, Any] = {
         "kind": "allocation",
         "found": int(allocated.answer.found),
-        "criterion": allocated.asked.criterion,
-        "target": allocated.asked.target,
-        "choices": allocated.way,
+        "criterion": allocated.criterion,
+        "target": allocated.target,
+        "choices": allocated.kind,
         "proven": int(allocated.answer.proven),
         "prices": [  # JSON has no infinite numbers
             {**asdict(price), "most": price.most if np.isfinite(price.most) else None}
@@ -208,13 +179,19 @@ def _by_measure(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
     count, positions, rows = toleranced.sizes["measure"], toleranced.sizes["position"], allocated.rows
     used, saving, curve = np.full(count, np.nan), np.full(count, np.nan), np.full((count, positions), np.nan)
     if allocated.answer.found:
-        shares, table, answer = allocated.answer.used, allocated.study.table(allocated.asked.steps), allocated.answer
+        shares, table, answer = (
+            allocated.answer.used,
+            allocated.study.table(int(toleranced.attrs["steps"])),
+            allocated.answer,
+        )
         for k in np.unique(rows.measure):
-            used[k], saving[k] = np.max(shares[rows.measure == k]), np.sum(allocated.answer.price[rows.measure == k])
+            used[k], saving[k] = np.max(shares[rows.measure == k]), np.sum(answer.price[rows.measure == k])
         for k in range(count):
-            curve[k] = used_curve(allocated.study, table, rows, answer.problem, answer.tolerances, k)
+            curve[k] = used_curve(
+                allocated.study, table, rows, allocated.criterion, answer.problem, answer.tolerances, k
+            )
     arrays = {"used": used, "used_curve": curve, "saving": saving}
-    if allocated.asked.criterion == "yield":
+    if allocated.criterion == "yield":
         arrays["yield_margin"] = np.full(count, np.nan)
         if allocated.answer.found:
             arrays["yield_margin"][rows.measure] = allocated.answer.problem.margins()
@@ -230,7 +207,7 @@ def _totals(allocated: Allocated) -> Mapping[str, Any]:
         "cost_bound": answer.bound,
         "gap": answer.gap,
     }
-    if allocated.asked.criterion == "yield":
+    if allocated.criterion == "yield":
         arrays["yield_expected"] = answer.expected
     ends = ("", "_low", "_high")
     if answer.checked is not None:
@@ -260,7 +237,7 @@ def _summary(allocated: Allocated, arrays: Mapping[str, Any], toleranced: xr.Dat
         return
     yield Figure("cost_bound", "lower bound of the cost", answer.bound)
     if answer.sampled is not None:
-        yield Figure("yield_asked", "required yield", allocated.asked.target)
+        yield Figure("yield_asked", "required yield", allocated.target)
         yield Figure("yield", "yield of the samples", answer.sampled.share)
     if answer.checked is not None:
         yield Figure("yield_checked", "yield of fresh samples", answer.checked.share)
@@ -271,11 +248,15 @@ def _summary(allocated: Allocated, arrays: Mapping[str, Any], toleranced: xr.Dat
 
 def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Why there is no allocation; limits that are not kept on the mechanism itself; what the criterion leaves out."""
-    answer, criterion = allocated.answer, allocated.asked.criterion
+    answer, criterion = allocated.answer, allocated.criterion
     yield from allocated.findings
     yield from answer.findings
     if not answer.found:
         return
+    if not answer.proven:
+        what = f"the optimality gap is {answer.gap:.1e} of the cost of the tolerances"
+        remedy = "check the orders of magnitude"
+        yield Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=answer.gap)
     if criterion != "yield" and allocated.study.effects.correlated:
         what = f"the criterion {criterion} ignores the correlations"
         remedy = "use a yield, which includes them"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.scales import scales_of
 from trunnion.model.tolerances import Tolerance
-from trunnion.statistics.population import Marginal
+from trunnion.statistics.draws import Marginal
 from trunnion.studies.allocation.problem import AllocationProblem, Criterion, RowEffects
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.linear import Direction, MeasureOrder, Table, ToleranceStudy, sound
@@ -29,7 +29,7 @@ __all__ = ["Rows", "rows_of", "used_curve"]
 
 Array = NDArray[np.float64]
 ANY = 1e-6  # half width, SI, at which the shape of a distribution is taken where there is none yet
-NUMBERS = ("worst", "lower", "upper", "half", "deviation", "mean", "offset")  # of effects, by row
+NUMBERS = ("linear", "spread", "drift", "lower", "upper", "offset")  # of effects, by row
 TEXTS = ("labels", "places", "units")
 
 
@@ -83,7 +83,7 @@ def rows_of(
     parts: list[Rows] = []
 
     def add(k: int, first: FirstOrder, time: Array, moves: bool) -> None:
-        effects = _limited(study, bought, criterion, k, first, ends[k])
+        effects = _effects(study, bought, criterion, k, first, ends[k])
         count, dial = len(time), system.dial(values, np.nan_to_num(time))
         placed = np.isfinite(time) & (study.run.cycle.duration > 0)
         effects = replace(
@@ -92,7 +92,7 @@ def rows_of(
             places=tuple(f" at {dial.at(i)}" if placed[i] else "" for i in range(count)),
             units=(orders[k].measure.figure_unit(system, values),) * count,
         )
-        finite = np.any(np.isfinite(ends[k])) & np.all(np.isfinite(effects.spread()), axis=1)
+        finite = np.any(np.isfinite(ends[k])) & np.all(np.isfinite(effects.linear + effects.spread), axis=1)
         parts.append(Rows(effects, np.full(count, k), np.full(count, moves), ends).picked(finite))
 
     for k, order in enumerate(orders):
@@ -104,8 +104,8 @@ def rows_of(
         add(k, FirstOrder(study.effects, course.slope[:, good]), time[good], order.measure.kind == "path_error")
 
         def used(first: FirstOrder, k: int = k) -> Array:
-            effects = _limited(study, bought, criterion, k, first, ends[k])
-            return AllocationProblem((), effects, criterion).used(halves)
+            effects = _effects(study, bought, criterion, k, first, ends[k])
+            return AllocationProblem((), effects).used(halves)
 
         worst = study.worst_place(order.measure, used, direction)
         add(k, FirstOrder(study.effects, worst.slope), np.array([worst.time]), True)
@@ -117,17 +117,17 @@ def rows_of(
 
 
 def used_curve(
-    study: ToleranceStudy, table: Table, rows: Rows, problem: AllocationProblem, tolerances: Array, k: int
+    study: ToleranceStudy, table: Table, rows: Rows, criterion: Criterion, problem: AllocationProblem, t: Array, k: int
 ) -> Array:
     """Share of its limits that a measure uses at each position of a table, by the criterion; NaN outside its window."""
     order, window = study.orders[k], table.plan.windows[study.measures[k].name]
     used = np.full(len(table.plan.times), np.nan)
     if (_everywhere(order) or order.placed) and k in rows.measure:
-        bought = {item.name: t for item, t in zip(problem.contributions, tolerances, strict=True) if not item.fixed}
-        effects = _limited(study, bought, problem.criterion, k, table.courses[k], rows.ends[k])
+        bought = {item.name: half for item, half in zip(problem.contributions, t, strict=True) if not item.fixed}
+        effects = _effects(study, bought, criterion, k, table.courses[k], rows.ends[k])
         margin = float(problem.margins()[rows.measure == k][0])
         effects = replace(effects, correlation=problem.effects.correlation)
-        used[window.index] = replace(problem, effects=effects, z=margin, caps=None).used(tolerances)
+        used[window.index] = replace(problem, effects=effects, z=margin, caps=None).used(t)
     return used
 
 
@@ -139,43 +139,37 @@ def _everywhere(order: MeasureOrder) -> bool:
     return root or (order.by_place and order.placed)
 
 
-def _limited(
+def _effects(
     study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, k: int, first: FirstOrder, ends: Array
 ) -> RowEffects:
     """Effects (row, contribution) on a measure, with its limits."""
-    unit = study.orders[k].measure.figure_unit(study.run.system, study.run.values)
-    effects = _effects(study, bought, criterion, first, scales_of(study.run).floor(unit))
-    lower, upper = np.repeat(ends[:, None], len(effects.worst), axis=1)
-    return replace(effects, lower=lower, upper=upper)
-
-
-def _effects(
-    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, first: FirstOrder, floor: float
-) -> RowEffects:
-    """Effects (row, contribution) without their limits. floor: what is rounding of the measure."""
-    count = len(study.inputs.names)
+    unit, count = study.orders[k].measure.figure_unit(study.run.system, study.run.values), len(study.inputs.names)
     spread = np.array(first.spread).reshape(5, count, -1)
-    still = (spread[2] > 0) & (spread[2] <= floor)  # a slope of rounding would bound a tolerance at kilometres
+    # a slope of rounding would bound a tolerance at kilometres
+    still = (spread[2] > 0) & (spread[2] <= scales_of(study.run).floor(unit))
     slopes = np.where(still, 0.0, first.sensitivity.reshape(count, -1))
-    lower, upper, half, shift, deviation = np.where(still, 0.0, spread)
+    lower, worst, half, shift, deviation = np.where(still, 0.0, spread)
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
         if study.effects.is_zone(i):
             size = bought.get(name, 1.0)
             offset += shift[i]  # of what turns about another place than its nominal one, and is not bought
-            upper[i] = 0.5 * (upper[i] - lower[i]) / size
+            worst[i] = 0.5 * (worst[i] - lower[i]) / size
             half[i], deviation[i] = half[i] / size, deviation[i] / size
             continue
         tolerance = study.inputs.tolerances[i]
-        scatter, drift, constant = _rates(tolerance)
+        scatter, rate, constant = _rates(tolerance)
         size = 1.0 if name in bought else tolerance.half_width
-        offset += slopes[i] * (tolerance.lower + tolerance.upper) / 2
-        if criterion == "yield":
-            offset += slopes[i] * constant
-        upper[i], half[i] = np.abs(slopes[i]) * size, slopes[i] * size
-        deviation[i], mean[i] = slopes[i] * scatter * size, slopes[i] * drift * size
-    nothing = np.zeros(0)
-    return RowEffects(upper.T, nothing, nothing, half.T, deviation.T, mean.T, offset)
+        offset += slopes[i] * ((tolerance.lower + tolerance.upper) / 2 + (constant if criterion == "yield" else 0.0))
+        worst[i], half[i] = np.abs(slopes[i]) * size, slopes[i] * size
+        deviation[i], mean[i] = slopes[i] * scatter * size, slopes[i] * rate * size
+    nothing, (least, most) = np.zeros_like(mean), np.repeat(ends[:, None], len(offset), axis=1)
+    linear, spread, drift = {
+        "worst-case": (worst, nothing, nothing),
+        "rss": (nothing, half, nothing),
+        "yield": (nothing, deviation, mean),
+    }[criterion]
+    return RowEffects(linear.T, spread.T, drift.T, least, most, offset)
 
 
 def _rates(tolerance: Tolerance) -> tuple[float, float, float]:

@@ -17,9 +17,7 @@ revised simplex method, Mathematical Programming Computation 10 (2018) 119–142
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
 from typing import Any
 
 import clarabel
@@ -30,7 +28,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.statistics.costs import COST_MODELS, Cost
-from trunnion.statistics.streams import factor
+from trunnion.statistics.draws import factor
 from trunnion.studies.allocation.problem import (
     ALLOWED,
     PROVEN,
@@ -39,12 +37,10 @@ from trunnion.studies.allocation.problem import (
     Contribution,
     common_options,
     none,
-    optimum,
     shortfalls,
 )
-from trunnion.studies.allocation.yields import Verify, meet
 
-__all__ = ["solve", "trade_off"]
+__all__ = ["cheapest"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -59,31 +55,18 @@ STARTS = (0.02, 0.06, 0.2, 0.5, 1.0)  # of the largest half width: first tangent
 ROUNDS = 2000  # of the linear problem
 
 
-def solve(
-    problem: AllocationProblem, target: float | None = None, verify: Verify | None = None, sure: bool = False
-) -> Answer:
-    """The allocation of least cost, or why there is none.
-
-    target: yield to meet, for the criterion `yield`; without it the problem's z is its margin. verify, sure: see
-    `yields.meet`.
-    """
-    if problem.criterion != "yield" or target is None:
-        return cheapest(problem)
-    return meet(problem, target, cheapest, verify, sure)
-
-
-def trade_off(problem: AllocationProblem, factors: Sequence[float]) -> list[Answer]:
-    """One answer for each factor by which all limits are multiplied; `found` is False where there is none."""
-    return [cheapest(replace(problem, effects=problem.effects.scaled(factor))) for factor in factors]
-
-
 def cheapest(problem: AllocationProblem) -> Answer:
     """The half widths and options of least cost with the problem's margin, or why there are none."""
     task = task_of(problem)
     groups = [members for members in problem.groups().values() if members[0].options]
-    choices = _Choices(problem, task, groups)
+    trouble = [
+        Finding("no option of the group lies within the bounds of all its members", f"costs.{members[0].name}",
+                "widen the bounds")
+        for members in groups if not common_options(members)
+    ]  # fmt: skip
     least = problem.narrowest()
-    trouble = choices.empty() or (shortfalls(problem, least) if task.rising or np.any(task.room <= 0) else [])
+    if not trouble and (task.rising or np.any(task.room <= 0)):
+        trouble = shortfalls(problem, least)
     what, free = "no limit bounds this tolerance, and wider is cheaper", np.flatnonzero(~np.isfinite(task.most))
     trouble = trouble or [
         Finding.error("allocation.unbounded", f"costs.{task.names[g]}", what, "state `most`") for g in free
@@ -91,7 +74,7 @@ def cheapest(problem: AllocationProblem) -> Answer:
     if trouble:
         return none(problem, trouble)
     try:
-        answer = choices.cheapest() if groups else _continuous(problem, task)
+        answer = _Choices(problem, task, groups).cheapest() if groups else _continuous(problem, task)
     except ArithmeticError:
         what = "the solver found no allocation, although the limits may be feasible"
         remedy = "check the orders of magnitude of costs and bounds"
@@ -108,9 +91,9 @@ def _continuous(problem: AllocationProblem, task: Task) -> Answer | None:
     if point is None:
         return None
     tolerances = task.tolerances(point.u)
-    price = np.zeros(len(problem.effects.worst))
+    price, costs = np.zeros(len(problem.effects.offset)), problem.costs(tolerances)
     np.add.at(price, task.row[point.rows], point.multipliers / task.room[point.rows])
-    return optimum(problem, tolerances, problem.costs(tolerances), point.bound, point.gap, price, {})
+    return Answer(problem, tolerances, costs, min(point.bound, float(np.sum(costs))), point.gap, price)
 
 
 # ---- unknowns, bounds and sides -------------------------------------------------------------------------------
@@ -178,13 +161,8 @@ class Task:
 
 def task_of(problem: AllocationProblem) -> Task:
     """The sides of a problem's rows that can bind, of a symmetric row only the nearer one, and its unknowns."""
-    effects, middle = problem.effects, problem.effects.middle()
-    nothing = np.zeros_like(effects.worst)
-    worst = effects.worst if problem.criterion == "worst-case" else nothing
-    drift = effects.drift() if problem.criterion == "yield" else nothing
-    spread = {"worst-case": nothing, "rss": effects.spread()}.get(problem.criterion)
-    if spread is None:
-        spread = problem.margins()[:, None] * effects.sigma()
+    effects, middle, drift = problem.effects, problem.effects.offset, problem.effects.drift
+    spread = problem.margins()[:, None] * effects.spread
     room = np.stack([effects.upper - middle, middle - effects.lower])
     one_sided = np.asarray(~np.any(drift, axis=1))
     keep = np.asarray(np.isfinite(room))
@@ -193,13 +171,13 @@ def task_of(problem: AllocationProblem) -> Task:
     matrix, root, least_share = effects.correlation, None, 1.0
     if matrix is not None and spread.any() and not np.array_equal(matrix, np.eye(len(matrix))):
         root, least_share = factor(matrix).T, float(np.sqrt(max(np.linalg.eigvalsh(matrix)[0], 0.0)))
-    linear = np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])
+    linear = np.concatenate([(effects.linear + drift)[keep[0]], (effects.linear - drift)[keep[1]]])
     both, rooms = (np.concatenate([part[0][keep[0]], part[1][keep[1]]]) for part in ((spread, spread), room))
     up = np.min(linear, axis=1, initial=0.0) >= 0
     with np.errstate(divide="ignore", invalid="ignore"):  # no effect, no bound; no room is told before it is used
         alone = np.where(up[:, None], rooms[:, None] / (linear + least_share * np.abs(both)), np.inf)
         linear, both = linear / rooms[:, None], both / rooms[:, None]
-        pair = ((effects.upper - effects.lower) / 2)[:, None] / (worst + least_share * np.abs(spread))
+        pair = ((effects.upper - effects.lower) / 2)[:, None] / (effects.linear + least_share * np.abs(spread))
     bounds = np.concatenate([alone, pair])  # of each half width, as the limits imply them
     implied = np.min(np.where(np.isnan(bounds), np.inf, bounds), axis=0, initial=np.inf)
 
@@ -324,41 +302,32 @@ def _side(task: Task, k: int, columns: int) -> tuple[Any, Array, Array]:
 class _Choices:
     """Outer approximation: unknowns x are [0/1 of all options, u of the groups with a cost model, their costs].
 
-    span: t = base + span · x; table, prices: half width and cost of every contribution by option, 0 of options of
-    others; parts: the options of each group; best: the least cost so far, the options taken, the other half widths.
+    span: t = base + span · x; owner: the group of each option; table, prices: half width and cost of every
+    contribution by option, 0 of options of others; cuts: rows · x ≤ right; best: the least cost so far, the options
+    taken, the other half widths.
     """
 
     def __init__(self, problem: AllocationProblem, task: Task, groups: list[list[Contribution]]) -> None:
         self.problem, self.task = problem, task
         place = {contribution.name: i for i, contribution in enumerate(problem.contributions)}
-        self.options = [common_options(members) for members in groups]
-        self.members = [[place[contribution.name] for contribution in members] for members in groups]
-        ends = [0, *accumulate(map(len, self.options))]
-        self.parts = [slice(*pair) for pair in pairwise(ends)]
-        self.count = ends[-1]  # of 0/1 numbers
+        offers = [(g, name, members, each) for g, members in enumerate(groups)
+                  for name, each in common_options(members).items()]  # fmt: skip
+        self.names = [{place[member.name]: name for member in members} for _, name, members, _ in offers]
+        self.count, self.owner = len(offers), np.array([g for g, *_ in offers])
         self.table, self.prices = np.zeros((2, len(place), self.count))
-        for part, members, options in zip(self.parts, self.members, self.options, strict=True):
-            for k, each in enumerate(options.values(), part.start):
-                self.table[members, k] = [option.tolerance for option in each]
-                self.prices[members, k] = [option.cost for option in each]
-        self.offers = self.prices.sum(axis=0)  # of every option to all of its group
-        self.cheapest_offers = np.array([np.min(self.offers[part], initial=np.inf) for part in self.parts])
-        self.base_cost = float(np.sum(self.cheapest_offers)) + sum(cost.numbers()["A"] for _, cost in task.costs)
+        for k, (_, _, members, each) in enumerate(offers):
+            rows = [place[member.name] for member in members]
+            self.table[rows, k], self.prices[rows, k] = [each.tolerance for each in each], [each.cost for each in each]
+        price = self.prices.sum(axis=0)  # of every option to all of its group
+        lowest = np.array([np.min(price[self.owner == g]) for g in range(len(groups))])
+        self.excess, self.lowest = price - lowest[self.owner], float(np.sum(lowest))
+        self.base_cost = self.lowest + sum(cost.numbers()["A"] for _, cost in task.costs)
         self.free = slice(self.count, self.count + len(task.unit))  # the unknowns u
         self.columns = self.free.stop + len(task.costs)
         self.span = np.zeros((len(place), self.columns))
         self.span[:, : self.count], self.span[:, self.free] = self.table, task.spans * task.unit
-        self.rows: list[Array] = []  # rows · unknowns ≤ right
-        self.right: list[float] = []
+        self.cuts: list[tuple[Array, float]] = []
         self.best: tuple[float, NDArray[np.bool_], Optimum | None] = np.inf, np.zeros(self.count, bool), None
-
-    def empty(self) -> list[Finding]:
-        """A finding of a group that has no option within its bounds."""
-        for options, members in zip(self.options, self.members, strict=True):
-            if not options:
-                what = "no option of the group lies within the bounds of all its members"
-                return [Finding(what, f"costs.{self.problem.contributions[members[0]].name}", "widen the bounds")]
-        return []
 
     def cheapest(self) -> Answer | None:
         """Rounds of linear problem and completion until they meet; None if no choice keeps the limits."""
@@ -380,15 +349,12 @@ class _Choices:
         if not np.isfinite(cost):
             return None
         t = self.task.tolerances(point.u if point else self.task.low) + self.table @ picked
-        choices = {
-            self.problem.contributions[i].name: list(options)[int(np.flatnonzero(picked[part])[0])]
-            for part, members, options in zip(self.parts, self.members, self.options, strict=True)
-            for i in members
-        }
+        places = {i: name for k in np.flatnonzero(picked) for i, name in self.names[k].items()}
+        choices = {self.problem.contributions[i].name: name for i, name in places.items()}
         costs = self.prices @ picked + self.problem.costs(t)
         gap = self._gap(bound) + (point.gap if point else 0.0)
-        no_price = np.full(len(self.problem.effects.worst), np.nan)
-        return optimum(self.problem, t, costs, bound, gap, no_price, choices)
+        no_price = np.full(len(self.problem.effects.offset), np.nan)
+        return Answer(self.problem, t, costs, min(bound, float(np.sum(costs))), gap, no_price, choices)
 
     def _gap(self, bound: float) -> float:
         """How far the best choice is from a bound, as a share of what it costs beyond the least of any choice."""
@@ -402,28 +368,23 @@ class _Choices:
         better one: it is left out, and no price of it makes the problem coarse.
         """
         task, inner = self.task, self.columns - self.count
-        sizes = [part.stop - part.start for part in self.parts]
-        excess = self.offers - np.repeat(self.cheapest_offers, sizes)
-        allowed = excess <= self.best[0] - self.base_cost
-        scale = float(np.max(excess[allowed], initial=0.0)) or 1.0
-        aim = (
-            np.concatenate([np.where(allowed, excess, 0.0), np.zeros(len(task.unit)), np.ones(len(task.costs))]) / scale
-        )
-        once = np.zeros((len(self.parts), self.columns))
-        for row, part in zip(once, self.parts, strict=True):
-            row[part] = 1.0
-        rules = [LinearConstraint(once, 1.0, 1.0)]
-        if self.rows:
-            rules.append(LinearConstraint(np.array(self.rows), -np.inf, np.array(self.right)))
-        costs = np.full(len(task.costs), np.inf)
-        low = np.concatenate([np.zeros(self.count), task.low, -costs])
-        high = np.concatenate([allowed.astype(float), task.high, costs])
+        allowed = self.excess <= self.best[0] - self.base_cost
+        scale = float(np.max(self.excess[allowed], initial=0.0)) or 1.0
+        zeros, ones = np.zeros(len(task.unit)), np.ones(len(task.costs))
+        aim = np.concatenate([np.where(allowed, self.excess, 0.0), zeros, ones]) / scale
+        once = (self.owner == np.unique(self.owner)[:, None]).astype(float)
+        rules = [LinearConstraint(np.pad(once, ((0, 0), (0, inner))), 1.0, 1.0)]
+        if self.cuts:
+            rows, right = zip(*self.cuts, strict=True)
+            rules.append(LinearConstraint(np.array(rows), -np.inf, np.array(right)))
+        low = np.concatenate([np.zeros(self.count), task.low, -np.inf * ones])
+        high = np.concatenate([allowed.astype(float), task.high, np.inf * ones])
         kinds = np.concatenate([np.ones(self.count), np.zeros(inner)])
         answer = milp(aim, integrality=kinds, bounds=Bounds(low, high), constraints=rules, options={"mip_rel_gap": 0.0})
         if answer.x is None:
             return None
         bound = answer.fun if answer.mip_dual_bound is None else min(answer.fun, answer.mip_dual_bound)
-        return np.asarray(answer.x), float(bound) * scale + float(np.sum(self.cheapest_offers))
+        return np.asarray(answer.x), float(bound) * scale + self.lowest
 
     def _cut_sides(self, picked: NDArray[np.bool_], u: Array, rows: Rows | None = None) -> None:
         """Add planes of these sides, else of those that a point breaks most: the square of a side without a linear part
@@ -437,10 +398,10 @@ class _Choices:
         for k, slope in zip(rows.tolist(), task.gradient(t, rows), strict=True):
             if not len(u) and task.factor is None and not task.linear[k].any():
                 square = task.spread[k] ** 2
-                self._add(square @ self.span**2, 1.0 - square @ task.base**2)
+                self.cuts.append((square @ self.span**2, float(1.0 - square @ task.base**2)))
             else:
                 row = slope @ self.span
-                self._add(row, 1.0 - value[k] + row @ x)
+                self.cuts.append((row, float(1.0 - value[k] + row @ x)))
 
     def _cut_costs(self, u: Array) -> None:
         """Add the tangents of all costs at half widths: cost ≥ value + slope (u − û)."""
@@ -450,16 +411,13 @@ class _Choices:
                 row, slope = np.zeros(self.columns), cost.slope(t) * self.task.unit[g]
                 row[self.count + g], row[place] = slope, -1.0
                 size = max(abs(slope), 1.0)
-                self._add(row / size, (slope * u[g] - cost.value(t)) / size)
-
-    def _add(self, row: Array, right: float) -> None:
-        self.rows.append(row)
-        self.right.append(float(right))
+                self.cuts.append((row / size, float(slope * u[g] - cost.value(t)) / size))
 
     def _complete(self, picked: NDArray[np.bool_], u: Array) -> None:
         """With these options: the best half widths of the others; the options are settled and not asked for again."""
         price, point = float(np.sum(self.prices @ picked)), None
-        self._add(np.append(picked.astype(float), np.zeros(self.columns - self.count)), len(self.parts) - 1.0)
+        again = np.append(picked.astype(float), np.zeros(self.columns - self.count))
+        self.cuts.append((again, float(np.sum(picked)) - 1.0))
         part = replace(self.task, base=self.task.base + self.table @ picked)
         least = part.low if self.task.rising else u
         if (self.task.rising or not len(u)) and np.any(part.value(part.tolerances(least)) > 1 + ALLOWED):

@@ -17,13 +17,13 @@ from scipy.optimize import brentq
 from scipy.special import chdtr, ndtr, ndtri
 
 from trunnion.errors import Finding, Severity
-from trunnion.statistics.streams import SobolStream, factor
+from trunnion.statistics.draws import factor, sobol
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial
+from trunnion.studies.allocation.solve import cheapest
 
 __all__ = ["Verify", "meet", "normal_yield"]
 
 Array = NDArray[np.float64]
-Solve = Callable[[AllocationProblem], Answer]
 Verify = Callable[[Array, int], SampledYield]
 DIRECTIONS = 2048
 ROWS = 128  # rows that are multiplied by all directions at once
@@ -37,16 +37,13 @@ ROUNDING = 1e-9  # of a yield and of its standard score
 UNKNOWN = SampledYield(np.nan, np.nan, np.nan)
 
 
-def meet(
-    problem: AllocationProblem, target: float, solve: Solve, verify: Verify | None = None, sure: bool = False
-) -> Answer:
+def meet(problem: AllocationProblem, target: float, verify: Verify | None = None, sure: bool = False) -> Answer:
     """The allocation of least cost whose yield meets a target.
 
     Parameters
     ----------
-    problem : its criterion is `yield`; its margin z is replaced
+    problem : its margin z is replaced
     target : share of mechanisms within all limits
-    solve : the allocation of least cost of a problem with its margin
     verify : the sampled yield of half widths (contribution,), from samples of a number: 0 for those that choose,
         1, 2, … for fresh ones; without it the yield is that of normal deviations and linear rows
     sure : whether the lower end of the interval of the fresh samples has to meet the target, and not only not miss it
@@ -61,7 +58,7 @@ def meet(
         share = normal_yield(problem, tolerances)
         return SampledYield(share, share, share)
 
-    linear = _Margins(problem, solve, normal)
+    linear = _Margins(problem, normal)
     steps = any(contribution.options for contribution in problem.contributions)  # where the yield is no steady one
     answer = linear.cheapest(target, _score(target), CLOSE_SAMPLED if steps else CLOSE)
     if not answer.found:
@@ -69,7 +66,7 @@ def meet(
     if verify is None:
         reckoned = answer.sampled or UNKNOWN
         return _judged(replace(answer, sampled=None, trials=()), target, reckoned, sure)
-    chosen = _Margins(problem, solve, lambda tolerances: verify(tolerances, 0), sure)
+    chosen = _Margins(problem, lambda tolerances: verify(tolerances, 0), sure)
     goal = target
     for number in range(1, CHECKS + 1):
         answer = chosen.cheapest(goal, answer.problem.z, CLOSE_SAMPLED)
@@ -105,7 +102,6 @@ class _Margins:
     """Answers by their margin, each with its yield. sure: whether the lower end of its interval counts."""
 
     problem: AllocationProblem
-    solve: Solve
     judge: Callable[[Array], SampledYield]
     sure: bool = False
     answers: dict[float, Answer] = field(default_factory=dict)
@@ -134,16 +130,17 @@ class _Margins:
         feasible = [answer for answer in self.answers.values() if answer.found]
         if not feasible:
             return self.at(low)
-        enough = [one for one in feasible if one.sampled and _score(self.level(one.sampled)) >= _score(goal) - ROUNDING]
-        best = max(feasible, key=lambda one: self.level(one.sampled) if one.sampled else 0.0)
-        answer = min(enough, key=lambda one: one.cost) if enough else best
-        trials = [Trial(z, one.cost, one.sampled) for z, one in self.answers.items() if one.sampled]
+        levels = [self.level(answer.sampled or UNKNOWN) for answer in feasible]
+        enough = [answer for answer, level in zip(feasible, levels, strict=True)
+                  if _score(level) >= _score(goal) - ROUNDING]  # fmt: skip
+        answer = min(enough, key=lambda each: each.cost) if enough else feasible[int(np.argmax(levels))]
+        trials = [Trial(z, each.cost, each.sampled) for z, each in self.answers.items() if each.sampled]
         return replace(answer, trials=tuple(trials))
 
     def at(self, z: float) -> Answer:
         """The cheapest answer with a margin, and its yield."""
         if z not in self.answers:
-            answer = self.solve(replace(self.problem, z=z))
+            answer = cheapest(replace(self.problem, z=z))
             if answer.found:
                 key = np.round(answer.tolerances, 15).tobytes()
                 if key not in self.yields:
@@ -169,10 +166,10 @@ def _largest_margins(problem: AllocationProblem) -> Array:
 def _spread_and_room(problem: AllocationProblem, tolerances: Array) -> tuple[Array, Array]:
     """Deviation of each row by independent numbers (row, part), and its room to both sides (side, row)."""
     effects = problem.effects
-    sigma = effects.sigma() * tolerances
+    sigma = effects.spread * tolerances
     if effects.correlation is not None:
         sigma = sigma @ factor(effects.correlation)
-    middle = effects.middle() + effects.drift() @ tolerances
+    middle = effects.offset + effects.drift @ tolerances
     return sigma, np.stack([effects.upper - middle, middle - effects.lower])
 
 
@@ -223,7 +220,7 @@ def _directions(dims: int) -> Array:
     """Unit vectors, each with its opposite, (component, direction)."""
     if dims == 1:
         return np.array([[1.0, -1.0]])
-    points = ndtri(SobolStream(seed=0, replicate=0, dims=dims).points(0, DIRECTIONS // 2))
+    points = ndtri(sobol(0, 0, dims, 0, DIRECTIONS // 2))
     points = points / np.sqrt(np.sum(points**2, axis=0))
     return np.concatenate([points, -points], axis=1)
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.statistics.streams import SobolStream
+from trunnion.statistics.draws import sobol
 from trunnion.studies.tolerance.sampling import Sampler
 
 __all__ = ["Indices", "indices"]
@@ -47,7 +47,7 @@ def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
         raise MechanismError(Finding(what, "correlations", "leave out --method sobol, or the correlations"))
     parts = inputs.parts
     base = min(max(1 << (max(1, samples // (len(parts) + 2)).bit_length() - 1), LEAST), MOST)
-    u = SobolStream(seed, 0, 2 * inputs.dims).points(0, base)
+    u = sobol(seed, 0, 2 * inputs.dims, 0, base)
     first, two = u[: inputs.dims], u[inputs.dims :]
 
     def analysed(points: Array) -> Array:

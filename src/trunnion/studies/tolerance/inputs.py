@@ -22,8 +22,7 @@ from trunnion.model.tolerances import FULL_TURN, Tolerance
 from trunnion.solve import shifts
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import Play, given_offsets
-from trunnion.statistics.population import Marginal, Population
-from trunnion.statistics.streams import correlated
+from trunnion.statistics.draws import Marginal, Population, correlated
 
 __all__ = ["Inputs", "inputs_of", "plays_of"]
 

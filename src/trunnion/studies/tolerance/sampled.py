@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Status
 from trunnion.measures.measures import Measure
 from trunnion.statistics import intervals
-from trunnion.statistics.moments import Moments, moments_of
+from trunnion.statistics.intervals import Moments, moments_of
 from trunnion.studies.tolerance.linear import Table, ToleranceStudy
 from trunnion.studies.tolerance.sampling import Samples
 

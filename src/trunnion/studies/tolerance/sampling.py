@@ -21,7 +21,7 @@ from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.statistics.streams import SobolStream, uniforms
+from trunnion.statistics.draws import sobol, uniforms
 from trunnion.studies.batch import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import kernel_of, many_of
@@ -156,16 +156,12 @@ class Sampler:
     many: Many
     times: Mapping[str, Array]
 
-    @cached_property
-    def _streams(self) -> list[SobolStream]:
-        return [SobolStream(self.job.seed, i, self.inputs.dims) for i in range(self.job.replicates)]
-
     def drawn(self, block: int) -> Array:
         """The uniform numbers of a block, (dims, sample)."""
         job = self.job
         if job.method == "quasi-monte-carlo":
             replicate, place = divmod(block, job.blocks // job.replicates)
-            return self._streams[replicate].points(place * job.block_size, job.block_size)
+            return sobol(job.seed, replicate, self.inputs.dims, place * job.block_size, job.block_size)
         first, last = block * job.block_size, min((block + 1) * job.block_size, job.samples)
         parts = [
             uniforms(job.seed, low // job.drawing, self.inputs.dims, min(job.drawing, last - low))

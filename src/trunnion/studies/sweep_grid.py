@@ -1,4 +1,4 @@
-"""The grid of a sweep: which numbers of a mechanism take which values, in the units they were given in."""
+"""The grid of a sweep: which numbers of a mechanism take which values, in the units they were given in; its figures."""
 
 from __future__ import annotations
 
@@ -10,18 +10,57 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.algebra.course import Place
+from trunnion.cycle.course import CycleCourse, Means, magnitude
+from trunnion.cycle.locking_course import least_margin
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.joints.pairs import PAIRS
+from trunnion.measures.measures import Measure, named
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import Dimension, normalise, si_unit, unit
-from trunnion.studies.sweep.figures import FIGURES
+from trunnion.results.dataset import Variable
+from trunnion.solve.run import Run
+from trunnion.solve.system import System
 
-__all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "grid", "named", "say"]
+__all__ = ["FIGURES", "MOST_NAMES", "MOST_POINTS", "Over", "Swept", "at_point", "grid", "say"]
 
 MOST_POINTS = 100_000
 MOST_NAMES = 6
 SUBJECTS = ("driver", "joint")  # the dimensions that are not swept
 
+# dims before the swept names; part: "errors" of those that only mechanisms with errors have, "margin" of the one that
+# is looked for only if asked
+FIGURES: dict[str, Variable] = {
+    "efficiency": Variable((), "1", "useful work over drive work of the cycle"),
+    "efficiency_error": Variable(
+        (), "1", "how far the errors of its integrals and pins that do not settle may have moved it"
+    ),
+    "efficiency_ideal": Variable((), "1", "efficiency of the mechanism without errors", part="errors"),
+    "drive_effort_min": Variable(("driver",), "effort", "minimum drive effort"),
+    "drive_effort_max": Variable(("driver",), "effort", "maximum drive effort"),
+    "drive_effort_rms": Variable(("driver",), "effort", "root mean square of the drive effort"),
+    "drive_power_mean": Variable((), "W", "mean power of all drivers"),
+    "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
+    "friction_power_mean": Variable((), "W", "mean power lost to friction"),
+    "reaction_max": Variable(("joint",), "N", "maximum reaction"),
+    "transmission_error_max": Variable(
+        ("joint",),
+        "transmission_error",
+        "largest error of the joint's rotation, of a prismatic joint its slide",
+        part="errors",
+    ),
+    "locking_margin": Variable(
+        (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", part="margin"
+    ),
+    "without_answer": Variable((), "1", "positions not solved", np.int32),
+    "not_valid": Variable(
+        (), "1", "positions at which a pin loses contact, left out of the figures", np.int32, part="errors"
+    ),
+    "status": Variable((), "1", "code of the gravest status of a position; see the attribute flag_meanings", np.int8),
+}
+
+Reduced = dict[str, Any]
 Values = Sequence[float | str] | NDArray[np.float64]
 Over = Mapping[str, Values | tuple[float | str, float | str, int]]
 
@@ -140,7 +179,7 @@ def say(swept: Sequence[Swept], index: Sequence[int]) -> str:
 
 
 @contextmanager
-def named(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
+def at_point(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
     """What is wrong at a point of the grid says at which."""
     try:
         yield
@@ -149,3 +188,82 @@ def named(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
         raise MechanismError(
             [replace(finding, what=f"{finding.what} (at {where})") for finding in error.findings]
         ) from None
+
+
+# ---- figures --------------------------------------------------------------------------------------------------
+
+
+def reduced(
+    arrays: Mapping[str, NDArray[Any]],
+    course: CycleCourse | None,
+    ideal: Means | None,
+    margin: CycleCourse | None,
+    system: System,
+) -> Reduced:
+    """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
+
+    arrays: over positions, by the names of `results.VARIABLES`, the status among them; course: over the cycle, None
+    where a position has no answer; ideal: means of the mechanism without errors, None if it has none; margin: that of
+    the locking margin, if it was looked for.
+    """
+    status = arrays["status"]
+    missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
+    figures: Reduced = {"status": int(np.max(status)), "without_answer": missing}
+    figures["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
+    if margin is not None:
+        least, answered = least_margin(margin), np.all(status < Status.LOAD_UNDEFINED)
+        figures["locking_margin"] = np.nan if not answered else np.inf if least is None else least.value
+    if ideal:
+        figures["efficiency_ideal"] = ideal.efficiency
+    if missing or course is None or not np.any(course.sound):  # contact is lost everywhere
+        return figures
+    figures["status"] = max(figures["status"], int(np.max(course.status)))  # it may lock between two positions
+    means = course.means
+    joints, drivers = range(len(system.joints)), range(len(system.mechanism.drivers))
+    if ideal:
+        slides = [PAIRS[kind].guided for kind, _ in system.joints.values()]
+        names = [f"joint_{'slide' if slide else 'rotation'}_error" for slide in slides]
+        figures["transmission_error_max"] = [
+            _value(course.extreme(name, i, of=magnitude)) for i, name in enumerate(names)
+        ]
+    else:  # beside points with errors
+        figures |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}
+    ends = [[_value(course.extreme("drive_effort", i, sign=sign)) for i in drivers] for sign in (-1.0, 1.0)]
+    return figures | {
+        "efficiency": means.efficiency,
+        "efficiency_error": means.efficiency_error,
+        "drive_effort_min": ends[0],
+        "drive_effort_max": ends[1],
+        "drive_effort_rms": means.drive_effort_rms,
+        "drive_power_mean": means.drive_power_mean,
+        "useful_power_mean": means.useful_power_mean,
+        "friction_power_mean": means.friction_power.net,
+        "reaction_max": [_value(course.extreme("reaction_force", i, of=magnitude)) for i in joints],
+    }
+
+
+def _value(place: Place | None) -> float:
+    """An extreme; NaN where there is none."""
+    return float("nan") if place is None else place.value
+
+
+def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
+    """Measures by their names, each with one figure a cycle; MechanismError with all that cannot be swept, and why."""
+    measures = named(run.system.mechanism, names, run.values)
+    findings = []
+    for measure in measures:
+        where = f"measures.{measure.name}"
+        if measure.name in FIGURES:
+            what = f"the measure '{measure.name}' has the name of a figure of the sweep"
+            findings.append(Finding(what, where, "call it otherwise in the model"))
+        elif measure.of.against or measure.of_attitude(run.system):
+            what = f"the measure '{measure.name}' is a deviation from the nominal mechanism, and each point is its own"
+            findings.append(
+                Finding(what, where, "sweep another; see `trunnion tolerance` for the effect of tolerances on it")
+            )
+        elif measure.rule == "deviation":
+            what = f"the measure '{measure.name}' has a number at every position and none of the cycle"
+            findings.append(Finding(what, where, "state a position, at: 60 deg, or a statistic, as: maximum"))
+    if findings:
+        raise MechanismError(findings)
+    return measures

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from trunnion.statistics.population import Marginal, Population
-from trunnion.statistics.streams import MOST_POINTS, SobolStream, correlated, direction_numbers, factor, uniforms
+from trunnion.statistics.draws import Marginal, Population, correlated, factor, sobol, uniforms
 
 MASK = (1 << 64) - 1
 
@@ -44,51 +43,24 @@ def test_seed_out_of_range() -> None:
 
 
 # Sobol
-def test_directions_make_scipys_points() -> None:
-    engine = stats.qmc.Sobol(60, scramble=False, bits=32)
-    expected = engine.random(1 << 12).T
-    numbers, index = direction_numbers(60, 16), np.arange(1 << 12)
-    gray, points = index ^ index >> 1, np.zeros((60, 1 << 12), dtype=np.uint64)
-    for bit in range(16):
-        points ^= (gray >> bit & 1).astype(np.uint64) * numbers[:, bit, None]
-    np.testing.assert_array_equal(points / 2**32, expected)
-
-
 @settings(max_examples=60, deadline=None)
-@given(
-    st.integers(0, 2**50), st.integers(0, 50), st.integers(1, 9), st.lists(st.integers(0, 40), max_size=6), st.data()
-)
-def test_any_part_the_same_bits(seed: int, replicate: int, dims: int, parts: list[int], data: st.DataObject) -> None:
-    first = data.draw(st.integers(0, 2**17))
-    whole = SobolStream(seed, replicate, dims).points(first, sum(parts))
-    stream, starts = SobolStream(seed, replicate, dims), np.cumsum([first, *parts])
-    for place in data.draw(st.permutations(range(len(parts)))):
-        start = starts[place] - first
-        np.testing.assert_array_equal(
-            stream.points(int(starts[place]), parts[place]), whole[:, start : start + parts[place]]
-        )
+@given(st.integers(0, 2**50), st.integers(0, 50), st.integers(1, 9), st.integers(0, 2**14), st.integers(1, 40))
+def test_any_part_the_same_bits(seed: int, replicate: int, dims: int, first: int, count: int) -> None:
+    together = sobol(seed, replicate, dims, first, count + 7)
+    np.testing.assert_array_equal(sobol(seed, replicate, dims, first + 7, count), together[:, 7:])
 
 
 @pytest.mark.parametrize("replicate", [0, 3])
 def test_scrambled_points_are_a_net(replicate: int) -> None:
     """Every 2ᵐ points from a multiple of 2ᵐ on have one in each 2ᵐth of every axis; 1, 2 are a (0, m, 2)-net."""
-    stream = SobolStream(5, replicate, 20)
     for first in (0, 1 << 10, 7 << 10):
-        points = stream.points(first, 1 << 10)
+        points = sobol(5, replicate, 20, first, 1 << 10)
         assert (np.sort(np.floor(points * 2**10), axis=1) == np.arange(2**10)).all()
         for power in range(11):
             cell = np.floor(points[0] * 2**power) * 2 ** (10 - power) + np.floor(points[1] * 2 ** (10 - power))
             assert len(set(cell)) == 2**10
     assert (points > 0).all()
     assert (points < 1).all()
-
-
-def test_far_points_without_those_before() -> None:
-    stream = SobolStream(1, 0, 3)
-    a, b = stream.points((1 << 24) - 3, 3), stream.points((1 << 24) - 2, 40)
-    np.testing.assert_array_equal(a[:, 1:], b[:, :2])
-    with pytest.raises(ValueError, match="more replicates"):
-        stream.points(MOST_POINTS - 1, 2)
 
 
 # correlation

@@ -1,1 +1,0 @@
-"""How the figures of a cycle change with numbers of the mechanism."""

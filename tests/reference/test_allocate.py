@@ -260,9 +260,12 @@ def test_no_figure_depends_on_the_steps(measure: dict[str, str], criterion: Any)
 
 def test_a_distance_is_kept_in_every_direction_at_least_cost() -> None:
     """Σ B/t^0.45 with Σ |u·∂C/∂l| t ≤ 0.05 mm for all unit vectors u at all angles, by SLSQP on a grid of both."""
-    result = trunnion.allocate(fourbar(measures={"m": {"path_error": "coupler.C", "limit": "±0.05 mm"}}), samples=0)
+    model = fourbar(measures={"m": {"path_error": "coupler.C", "limit": "±0.05 mm"}})
+    result = trunnion.allocate(model, samples=0)
     assert float(result["cost_total"]) == pytest.approx(21.7296386, rel=1e-6)
     assert dimensions(result) == pytest.approx([0.02272726, 0.01231861, 0.01622134, 0.01372147], rel=1e-3)
+    linear = trunnion.tolerance(model.with_tolerances(half_widths(result)), methods=["linear"], steps=24)
+    assert float(linear["worst_case_upper"][0]) == pytest.approx(5e-5, rel=1e-6)
 
 
 def test_an_absurd_price_proves_nothing() -> None:

@@ -16,7 +16,7 @@ a ball. What pins at the rims of their holes do beyond first order is searched o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -40,12 +40,11 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import readable
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run, prepare
-from trunnion.solve.space.determinacy import spins_of
+from trunnion.solve.run import prepare
 from trunnion.statistics.draws import Population
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.inputs import Inputs, plays_of
-from trunnion.studies.tolerance.linear import Table, ToleranceStudy, stated_or_outputs
+from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, stated_or_outputs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,46 +94,22 @@ class JointEffects(NamedTuple):
     loads: Array
 
 
-@dataclass(frozen=True)
-class Played:
-    """What play does to measures over the cycle, and at the one place of each.
+class Reading(NamedTuple):
+    """What play does to one measure over the cycle, and at its place.
 
-    measures: as they were asked for; table: their courses; figures: of each at its place, which is a stated one, that
-    of a maximum or minimum, or where its worst case is largest; over_cycle, at_places: what the joints do there.
+    The place is a stated one, that of a maximum or minimum, or where the worst case is largest. kind: what the place
+    is, for tables, empty where it is stated; limit: the deviation allowed to either side where the measure is judged,
+    at its place, or at every position.
     """
 
-    run: Run
-    measures: Sequence[Measure]
-    table: Table
-    figures: ToleranceStudy
-    over_cycle: list[JointEffects]
-    at_places: list[JointEffects]
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Those with a play."""
-        return self.figures.inputs.loose
-
-    def place(self, i: int) -> str:
-        """Where in the cycle the place of a measure is, in words."""
-        time, times = self.figures.orders[i].time, self.table.plan.times
-        near = float(times[np.argmin(np.abs(times - time))])
-        time = near if abs(time - near) <= BESIDE * self.run.cycle.duration else time
-        return self.run.system.dial(self.run.values, np.array([time])).at(0)
-
-    def kind_of_place(self, i: int) -> str:
-        """What the place of a measure is, for tables: empty where it is stated."""
-        measure = self.measures[i]
-        if measure.at is not None or len(self.table.plan.times) == 1:
-            return ""
-        return f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
-
-    def limit(self, i: int) -> float | None:
-        """The deviation allowed to either side where a measure is judged: at its place, or at every position."""
-        measure = self.measures[i]
-        sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
-        placed = measure.at is not None or measure.rule in EXTREMES
-        return min(sides) if placed and sides else measure.limit
+    measure: Measure
+    order: MeasureOrder
+    curve: Array
+    over_cycle: JointEffects
+    at_place: JointEffects
+    place: str
+    kind: str
+    limit: float | None
 
 
 @strict_arguments
@@ -174,7 +149,20 @@ def play(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    picked, notes = _measures(run, measures)
+    named = chosen(mechanism, measures, run.values)
+    picked = [  # those with one value at every position, and a figure of one place: no mean, and no peak-to-peak
+        measure for measure in named
+        if (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
+    ]  # fmt: skip
+    others, notes = [measure.name for measure in named if measure not in picked], list[Finding]()
+    if others:
+        what = f"play covers measures with one value at every position, which {', '.join(others)} has not"
+        remedy = "use `trunnion tolerance` for other measures"
+        if measures is not None:
+            raise MechanismError(Finding(what, "measures", remedy))
+        notes.append(Finding.note("play.measures_left_out", "measures", what, remedy, measures=others))
+    picked, outputs_taken = stated_or_outputs(run, picked)
+    notes = [*outputs_taken, *notes]
     loose = tuple(plays_of(run))
     if not loose:
         remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
@@ -195,33 +183,24 @@ def play(
         ]  # fmt: skip
         figures = replace(over_cycle, measures=tuple(placed))
     table = over_cycle.table(steps)
+    times, duration = table.plan.times, run.cycle.duration
     singular = np.where(table.status >= Status.SINGULAR, np.nan, 0.0)  # there is no answer
-    by_position = [
-        _by_joint(course, singular + 0.0 * curve) for course, curve in zip(table.courses, table.curves, strict=True)
-    ]
-    at_places = [_by_joint(order.figure, np.zeros(())) for order in figures.orders]
-    played = Played(run, picked, table, figures, by_position, at_places)
-    return _dataset(played, [*_findings(played), *notes])
-
-
-def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
-    """The measures asked for; notes where they are chosen because none is stated, or some are left out.
-
-    Each has one number at every position, and its figure is of one place: no mean, and no peak-to-peak.
-    """
-    measures = chosen(run.system.mechanism, names, run.values)
-    covered = [
-        measure for measure in measures
-        if (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
-    ]  # fmt: skip
-    others = [measure.name for measure in measures if measure not in covered]
-    what = f"play covers measures with one value at every position, which {', '.join(others)} has not"
-    remedy = "use `trunnion tolerance` for other measures"
-    if others and names is not None:
-        raise MechanismError(Finding(what, "measures", remedy))
-    notes = [Finding.note("play.measures_left_out", "measures", what, remedy, measures=others)] if others else []
-    covered, outputs_taken = stated_or_outputs(run, covered)
-    return covered, [*outputs_taken, *notes]
+    readings = []
+    for measure, order, course, curve in zip(picked, figures.orders, table.courses, table.curves, strict=True):
+        near = float(times[np.argmin(np.abs(times - order.time))])
+        time = near if abs(order.time - near) <= BESIDE * duration else order.time
+        extreme = measure.rule in EXTREMES
+        kind = f"the {measure.rule}" if extreme else "largest"
+        sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
+        judged_there = bool((measure.at is not None or extreme) and sides)
+        readings.append(
+            Reading(
+                measure, order, curve, _by_joint(course, singular + 0.0 * curve),
+                _by_joint(order.figure, np.zeros(())), run.system.dial(run.values, np.array([time])).at(0),
+                kind if measure.at is None and len(times) > 1 else "", min(sides) if judged_there else measure.limit,
+            )
+        )  # fmt: skip
+    return _dataset(figures, table, readings, [*_findings(figures, table, readings), *notes])
 
 
 def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
@@ -246,8 +225,8 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _findings(played: Played) -> Iterator[Finding]:
-    run, mechanism = played.run, played.run.system.mechanism
+def _findings(study: ToleranceStudy, table: Table, readings: Sequence[Reading]) -> Iterator[Finding]:
+    run, mechanism = study.run, study.run.system.mechanism
     yield from of_run(run, notes=False)
     if run.determinacy is not None and any(part.redundant for part in run.determinacy.parts):
         what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
@@ -261,48 +240,35 @@ def _findings(played: Played) -> Iterator[Finding]:
         what, remedy = f"the play of {', '.join(kinds)} is left out", f"play is modelled in {', '.join(models)} joints"
         yield Finding.warning("play.left_out", "joints", what, remedy, joints=kinds)
     touching = {joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints}
-    if toothed := sorted(touching & {*played.joints}):
+    if toothed := sorted(touching & {*study.inputs.loose}):
         what = f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out"
         yield Finding.warning("play.gears", "gears", what, joints=toothed)
-    for _, (link, *ends), members in spins_of(run.system):
-        for measure in played.measures:
-            owner, _, point = measure.subject.partition(".")
-            if owner in members and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                what = f"'{owner}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
-                figures = {"link": link, "points": list(ends)}
-                yield Finding.warning("play.spin", f"measures.{measure.name}", what, **figures)
-    if run.seats:
-        seated = [seat.joint for seat in run.seats]
-        what = f"play is relative to the middle of the holes, whatever the seats of {', '.join(seated)}"
-        remedy = "`trunnion analyse` has the deviation with these seats"
-        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=seated)
-    status, dial = played.table.status, run.system.dial(run.values, played.table.plan.times)
-    for i, measure in enumerate(played.measures):
-        yield from _of_measure(played, i)
-        lost = np.any(np.isnan(played.over_cycle[i].worst_case), axis=0) & np.isfinite(played.table.curves[i])
-        if np.any(lost & (status < Status.SINGULAR)):
-            at = dial.intervals(np.flatnonzero(lost & (status < Status.SINGULAR)))
+    dial = run.system.dial(run.values, table.plan.times)
+    for reading in readings:
+        yield from _of_measure(study, reading)
+        lost = np.any(np.isnan(reading.over_cycle.worst_case), axis=0) & np.isfinite(reading.curve)
+        if np.any(lost & (table.status < Status.SINGULAR)):
+            at = dial.intervals(np.flatnonzero(lost & (table.status < Status.SINGULAR)))
             what = f"a magnitude that is 0 has no derivative {at}"
-            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, at=at)
+            yield Finding.warning("play.no_answer", f"measures.{reading.measure.name}", what, at=at)
     for code in Status:
-        where = np.flatnonzero(status == code)
+        where = np.flatnonzero(table.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
             at = dial.intervals(where)
             yield Finding.error("play.no_answer", "", f"{code.text} {at}", at=at, status=code.text)
 
 
-def _of_measure(played: Played, i: int) -> Iterator[Finding]:
+def _of_measure(study: ToleranceStudy, reading: Reading) -> Iterator[Finding]:
     """Whether the worst case of a measure keeps its limit, and whether pins at the rims of their holes change it
     otherwise than first order says.
 
     One of forces is not looked at where a joint is at rest: there the pins turn the sense of its friction.
     """
-    measure, study, order = played.measures[i], played.figures, played.figures.orders[i]
-    limit, first = played.limit(i), float(np.sum(played.at_places[i].worst_case))
-    unit, where = measure.unit(played.run.system), f"measures.{measure.name}"
+    measure, order, limit, place = reading.measure, reading.order, reading.limit, reading.place
+    first, unit = float(np.sum(reading.at_place.worst_case)), measure.unit(study.run.system)
+    where = f"measures.{measure.name}"
     if not np.isfinite(first):
         return
-    place = played.place(i)
     if limit is not None:
         figures: dict[str, Any] = {"worst": first, "limit": limit, "at": place}
         what = f"the worst case to first order, {readable(first, unit)} at {place}, "
@@ -329,14 +295,15 @@ def _of_measure(played: Played, i: int) -> Iterator[Finding]:
 # ---- the result -----------------------------------------------------------------------------------------------
 
 
-def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
+def _dataset(
+    study: ToleranceStudy, table: Table, readings: Sequence[Reading], findings: Sequence[Finding]
+) -> xr.Dataset:
     """The arrays with names, units, summary and provenance."""
-    run, system, mechanism, table = played.run, played.run.system, played.run.system.mechanism, played.table
-    worst, deviation, loads = (np.array(parts) for parts in zip(*played.over_cycle, strict=True))
-    worst_there, deviation_there, _ = (np.array(parts) for parts in zip(*played.at_places, strict=True))
-    radii = np.full((len(played.joints), loads.shape[2]), np.nan)
-    for row, joint in zip(radii, played.joints, strict=True):
-        for end, radius in enumerate(played.figures.inputs.play(joint, run.values).radii):
+    run, system, joints = study.run, study.run.system, study.inputs.loose
+    worst, deviation, loads = (np.array([reading.over_cycle[k] for reading in readings]) for k in range(3))
+    radii = np.full((len(joints), loads.shape[2]), np.nan)
+    for row, joint in zip(radii, joints, strict=True):
+        for end, radius in enumerate(study.inputs.play(joint, run.values).radii):
             row[end] = max(float(np.ravel(primal(radius))[0]), 0.0)
     arrays: dict[str, Array | NDArray[np.int8]] = {
         "value": np.array(table.curves),
@@ -348,48 +315,49 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "sensitivity": loads,
         "radius": radii,
         "status": table.status,
-        "extreme_worst_case": worst_there,
-        "extreme_deviation": deviation_there,
-        "extreme_time": np.array([order.time for order in played.figures.orders]),
+        "extreme_worst_case": np.array([reading.at_place.worst_case for reading in readings]),
+        "extreme_deviation": np.array([reading.at_place.deviation for reading in readings]),
+        "extreme_time": np.array([reading.order.time for reading in readings]),
     }
-    units, count = [measure.unit(system) for measure in played.measures], len(played.measures)
-    plain_units, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
+    units = [reading.measure.unit(system) for reading in readings]
     labels = {
-        "measure": [measure.name for measure in played.measures],
-        "joint": list(played.joints),
+        "measure": [reading.measure.name for reading in readings],
+        "joint": list(joints),
         "end": [str(k + 1) for k in range(loads.shape[2])],
         "axis": ["x", "y", "z"],
     }
-    dial = system.dial(run.values, table.plan.times)
+    dial, summary = system.dial(run.values, table.plan.times), list[Figure]()
+    for reading, unit in zip(readings, units, strict=True):
+        name, (effects, deviations, _) = reading.measure.name, reading.at_place
+        total, aspect = float(np.sum(effects)), f"of {reading.kind}" if reading.kind else ""
+        figure = Figure(f"{name}.worst_case", f"{name}, worst case to first order", None, unit)
+        if not np.isfinite(total):
+            summary.append(figure)
+            continue
+        aspect = "maximum" if reading.kind == "largest" else aspect
+        rss, sigma = (float(np.sqrt(np.sum(part**2))) for part in (effects, deviations))
+        summary += [
+            replace(figure, value=total, aspect=aspect, place=f"at {reading.place}"),
+            Figure(f"{name}.rss", f"{name}, RSS there", rss, unit),
+            Figure(f"{name}.deviation", f"{name}, standard deviation there", sigma, unit),
+            *(
+                Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", float(effect), unit)
+                for joint, effect in zip(joints, effects, strict=True)
+            ),
+        ]
     attributes = {
-        **origin(mechanism, system.plan.formula),
-        **cited(references(mechanism)),
-        "limits": [played.limit(i) for i in range(count)],
-        "inputs": inputs(mechanism),
+        **origin(system.mechanism, system.plan.formula),
+        **cited(references(system.mechanism)),
+        "limits": [reading.limit for reading in readings],
+        "inputs": inputs(system.mechanism),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(run.cycle.periodic),
-        "places": [[played.kind_of_place(i), played.place(i)] for i in range(count)],
-        **scales_of(run).summary(_summary(played, units)),
+        "places": [[reading.kind, reading.place] for reading in readings],
+        **scales_of(run).summary(summary),
         "findings": finding_rows(findings),
     }
-    variables = described(arrays, VARIABLES, {"measure": plain_units, "sensitivity": per_length})
+    members = {"measure": MemberUnits("measure", units)}
+    members["sensitivity"] = MemberUnits("measure", [f"{unit}/m" for unit in units])
+    variables = described(arrays, VARIABLES, members)
     return dataset_of("play", variables, labels, attributes, driven(table.plan.times, *dial))
-
-
-def _summary(played: Played, units: Sequence[str]) -> Iterator[Figure]:
-    """Of each measure the worst case at its place: what each joint has in it, RSS and deviation."""
-    for i, (measure, unit) in enumerate(zip(played.measures, units, strict=True)):
-        name, at_place, kind = measure.name, played.at_places[i], played.kind_of_place(i)
-        total = float(np.sum(at_place.worst_case))
-        if not np.isfinite(total):
-            yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", None, unit)
-            continue
-        aspect = "maximum" if kind == "largest" else f"of {kind}" if kind else ""
-        at = f"at {played.place(i)}"
-        yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", total, unit, aspect, at)
-        rss, deviation = (float(np.sqrt(np.sum(part**2))) for part in (at_place.worst_case, at_place.deviation))
-        yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
-        yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
-        for joint, effect in zip(played.joints, at_place.worst_case, strict=True):
-            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", float(effect), unit)

@@ -23,7 +23,7 @@ from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.draws import Marginal
 from trunnion.studies.allocation.problem import AllocationProblem, Criterion, RowEffects
 from trunnion.studies.tolerance.effects import FirstOrder
-from trunnion.studies.tolerance.linear import Direction, MeasureOrder, Table, ToleranceStudy, sound
+from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, sound
 
 __all__ = ["Rows", "rows_of", "used_curve"]
 
@@ -79,7 +79,7 @@ def rows_of(
     orders, system, values = study.orders, study.run.system, study.run.values
     ends = np.array([tight.get(order.measure.name, 1.0) * np.array(order.limits) for order in orders])
     halves = np.array([bought.get(name, 1.0) for name in study.inputs.names])
-    direction: Direction = "worst" if criterion == "worst-case" else "scatter"
+    of_worst = criterion == "worst-case"
     parts: list[Rows] = []
 
     def add(k: int, first: FirstOrder, time: Array, moves: bool) -> None:
@@ -97,9 +97,10 @@ def rows_of(
 
     for k, order in enumerate(orders):
         if not _everywhere(order):
-            add(k, order.figure, np.array([order.time if order.placed else np.nan]), order.by_place)
+            first = order.worst if of_worst and order.by_place else order.figure
+            add(k, first, np.array([order.time if order.placed else np.nan]), order.by_place)
             continue
-        time, course, status = study.scanned(order.measure, direction)
+        time, course, status = study.scanned(order.measure, of_worst)
         good = sound(status)
         add(k, FirstOrder(study.effects, course.slope[:, good]), time[good], order.measure.kind == "path_error")
 
@@ -107,8 +108,8 @@ def rows_of(
             effects = _effects(study, bought, criterion, k, first, ends[k])
             return AllocationProblem((), effects).used(halves)
 
-        worst = study.worst_place(order.measure, used, direction)
-        add(k, FirstOrder(study.effects, worst.slope), np.array([worst.time]), True)
+        worst = study.worst_place(order.measure, used, of_worst)
+        add(k, worst.worst if of_worst else worst.scatter, np.array([worst.time]), True)
     rows = _joined(parts)
     limited = [k for k in range(len(orders)) if np.any(np.isfinite(ends[k]))]
     unknown = tuple(orders[k].measure.name for k in limited if k not in rows.measure)
@@ -124,7 +125,8 @@ def used_curve(
     used = np.full(len(table.plan.times), np.nan)
     if (_everywhere(order) or order.placed) and k in rows.measure:
         bought = {item.name: half for item, half in zip(problem.contributions, t, strict=True) if not item.fixed}
-        effects = _effects(study, bought, criterion, k, table.courses[k], rows.ends[k])
+        course = (table.worst if criterion == "worst-case" else table.courses)[k]
+        effects = _effects(study, bought, criterion, k, course, rows.ends[k])
         margin = float(problem.margins()[rows.measure == k][0])
         effects = replace(effects, correlation=problem.effects.correlation)
         used[window.index] = replace(problem, effects=effects, z=margin, caps=None).used(t)

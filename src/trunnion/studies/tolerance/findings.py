@@ -194,7 +194,7 @@ def _remedy(outcome: Outcome, of: MeasureOrder) -> str:
     lower, upper = of.limits
     # the variance decides a yield, and the worst case knows no correlation
     of_what = "worst case" if outcome.target is None else "variance"
-    parts = np.nan_to_num(of.figure.spread.worst if outcome.target is None else of.figure.covariances)
+    parts = np.nan_to_num(of.worst.spread.worst if outcome.target is None else of.figure.covariances)
     if lower > 0 or upper < 0 or not np.sum(parts) > 0:
         return "change the nominal mechanism or the limit: tolerances cannot correct it"
     top = int(np.argmax(parts))

@@ -2,9 +2,10 @@
 
 ∂y/∂p are dual parts, carried through the whole analysis at once: motion, friction, what makes a figure of a course.
 A largest deviation, or a distance from the nominal place, has no derivative at the nominal mechanism, where it is 0:
-of these the derivatives are those of the course at the place where the worst case is largest, of a distance along the
-direction of the largest scatter, of a peak-to-peak deviation between the two places where it is worst. Places are
-looked for on the panels of the measure's courses, so that no figure depends on the rows of a table.
+of these the derivatives are those of the course at the place where the worst case is largest, of a peak-to-peak
+deviation between the two places where it is worst. A distance has them along two directions: its worst case along the
+one in which that is largest, its scatter along that of the largest scatter. Places are looked for on the panels of the
+measure's courses, so that no figure depends on the rows of a table.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,6 @@ from trunnion.studies.tolerance.search import Corner, search
 __all__ = ["MeasureOrder", "Table", "ToleranceStudy", "limited", "stated_or_outputs", "study"]
 
 Array = NDArray[np.float64]
-Direction = Literal["scatter", "worst"]  # of a distance: along which it scatters most, or is farthest in the worst case
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
 MOST_PAIRS = 720  # places between which a peak-to-peak deviation is looked for
 ROUNDS, AROUND = 7, 17  # in which the worst place is looked for, and places about it in each
@@ -55,10 +55,11 @@ class Walked(NamedTuple):
 
 
 class WorstPlace(NamedTuple):
-    """Time, s, NaN of two places; derivatives of the measure there, (row,); status of the nominal mechanism."""
+    """Time, s, NaN of two places; first order there, of the worst case and of the scatter; status of the mechanism."""
 
     time: float
-    slope: Array
+    worst: FirstOrder
+    scatter: FirstOrder
     status: int
 
 
@@ -67,28 +68,21 @@ class MeasureOrder:
     """The figure of one measure to first order.
 
     nominal: of the nominal mechanism, 0 of what is a deviation by itself, NaN where there is none; against: whether it
-    is judged against the nominal mechanism. figure: its derivatives, total: all together. time: of its place, s, NaN if
-    it is of no single one; rests: whether a joint is at rest there. lead: what the search of the worst case begins
-    with, `figure` where that has derivatives.
+    is judged against the nominal mechanism. by_place: whether the figure is 0 of the nominal mechanism, without a
+    derivative, but has that of the course somewhere. figure: its derivatives; worst: those of the worst case, other
+    ones of a distance, and what the search of it begins with where the figure has none; total: all together. time: of
+    its place, s, NaN if it is of no single one; rests: whether a joint is at rest there.
     """
 
     measure: Measure
     nominal: float
     against: bool
+    by_place: bool
     figure: FirstOrder
+    worst: FirstOrder
     total: Spread
     time: float
     rests: bool
-    lead: FirstOrder
-
-    @property
-    def by_place(self) -> bool:
-        """Whether the figure is 0 of the nominal mechanism, without a derivative, but has that of the course somewhere.
-
-        Of a distance neither the mean, the least nor any spread has; of other deviations the root of the mean square
-        has not; and nothing is largest or least of a course that is 0 throughout.
-        """
-        return _by_place(self.measure, self.against)
 
     @property
     def placed(self) -> bool:
@@ -122,12 +116,13 @@ class MeasureOrder:
 
 @dataclass(frozen=True)
 class Table:
-    """The courses at the positions of a table: of every measure, within its window, the nominal one and first order;
-    the status of the nominal mechanism, (position,)."""
+    """The courses at the positions of a table: of every measure, within its window, the nominal one, its first order
+    and that of its worst case; the status of the nominal mechanism, (position,)."""
 
     plan: PositionPlan
     curves: Sequence[Array]
     courses: Sequence[FirstOrder]
+    worst: Sequence[FirstOrder]
     status: NDArray[np.int8]
 
     def spread(self, arrays: Sequence[Array]) -> Array:
@@ -169,13 +164,23 @@ class ToleranceStudy:
     @cached_property
     def orders(self) -> list[MeasureOrder]:
         """First order of every measure about the nominal mechanism."""
-        against = [measure.against_nominal(self.run.system) for measure in self.measures]
-        rated = [measure for measure, is_against in zip(self.measures, against, strict=True)
-                 if _rated(measure, is_against)]  # fmt: skip
+        rated = [
+            measure for measure in self.measures
+            if measure.kind != "path_error" and not self._by_place(measure)
+            and (measure.rule in ("mean", "value") or not measure.against_nominal(self.run.system))
+        ]  # fmt: skip
         reading = self.many if len(rated) == len(self.measures) else self.many.only(rated)
         reads = reading.read(self.effects.values()) if rated else {}
-        return [self._order(measure, is_against, reads.get(measure.name))
-                for measure, is_against in zip(self.measures, against, strict=True)]  # fmt: skip
+        return [self._order(measure, reads.get(measure.name)) for measure in self.measures]
+
+    def _by_place(self, measure: Measure) -> bool:
+        """See `MeasureOrder`. Of a distance neither the mean, the least nor any spread has a derivative somewhere; of
+        other deviations the root of the mean square has not; and nothing is largest or least of what is 0 throughout.
+        """
+        if measure.kind == "path_error":
+            return measure.rule in ("deviation", "value", "maximum", "largest")
+        extremes = ("maximum", "minimum", "largest", "peak-to-peak")
+        return measure.rule == "deviation" or (measure.rule in extremes and measure.against_nominal(self.run.system))
 
     def worst(self) -> list[tuple[Corner, Corner]]:
         """Least and largest deviation of every measure on the mechanism itself, with the numbers there.
@@ -193,7 +198,7 @@ class ToleranceStudy:
                 read = alone.read(values)[name]
                 return effects.slopes(read.most if sign > 0 else read.least, ())
 
-            start = order.lead.corner(sign)
+            start = order.worst.corner(sign)
             alone.tune(self.effects.values(start))
             return search(self.effects, objective, start, sign, bool(np.isfinite(order.nominal)))
 
@@ -216,7 +221,8 @@ class ToleranceStudy:
     def table(self, steps: int) -> Table:
         """The courses of all measures at the positions of a table."""
         positions, system = plan(self.run, self.measures, steps), self.run.system
-        walked, curves, courses = self._walked(self.measures, positions.times), list[Array](), list[FirstOrder]()
+        walked, curves = self._walked(self.measures, positions.times), list[Array]()
+        courses, worst = list[FirstOrder](), list[FirstOrder]()
         lines = {measure.name: positions.windows[measure.name].time
                  for measure in self.measures if measure.rule == "line"}  # fmt: skip
         reads = self.many.read(self.effects.values(), lines) if lines else {}
@@ -229,6 +235,7 @@ class ToleranceStudy:
                 shown, slope = self.effects.slopes(reads[measure.name].shown, window.time.shape)
                 curves.append(shown[0])
                 courses.append(FirstOrder(self.effects, self.effects.without_noise(slope)))
+                worst.append(courses[-1])
                 continue
             if measure.kind == "path_error" or measure.of_attitude(system) or measure.of.against:
                 curve = 0.0 * curve
@@ -237,42 +244,50 @@ class ToleranceStudy:
             elif measure.turning(system):
                 curve = near(curve, self.many.angle(measure, window.time))
             curves.append(curve)
-            courses.append(self._course(measure, parts))
-        return Table(positions, curves, courses, walked[self.measures[0].name].status)
+            for orders, of_worst in ((courses, False), (worst, True)):
+                orders.append(self._course(measure, parts, of_worst))
+        return Table(positions, curves, courses, worst, walked[self.measures[0].name].status)
 
     @cached_property
     def _scans(self) -> dict[str, Walked]:
         return {}
 
-    def scanned(self, measure: Measure, direction: Direction = "scatter") -> tuple[Array, FirstOrder, NDArray[np.int8]]:
-        """Times, s, at which a course is looked through, whatever the steps; its first order there, and statuses."""
+    def scanned(self, measure: Measure, of_worst: bool) -> tuple[Array, FirstOrder, NDArray[np.int8]]:
+        """Times, s, at which a course is looked through, whatever the steps; its first order there, and statuses.
+
+        of_worst: whether first order is that of the worst case; see `_course`.
+        """
         time = self.many.spots(measure)
         if measure.name not in self._scans:
             self._scans[measure.name] = self._walked([measure], time)[measure.name]
         walked = self._scans[measure.name]
-        return time, self._course(measure, walked.parts, direction), walked.status
+        return time, self._course(measure, walked.parts, of_worst), walked.status
 
-    def worst_place(
-        self, measure: Measure, size: Callable[[FirstOrder], Array], direction: Direction = "scatter"
-    ) -> WorstPlace:
+    def worst_place(self, measure: Measure, size: Callable[[FirstOrder], Array], of_worst: bool = True) -> WorstPlace:
         """Where a course is worst, NaN s of a peak-to-peak deviation, which is of two places.
 
-        size: how bad a course is, (time,).
+        size: how bad a course is, (time,), by its first order, `of_worst` as for `scanned`.
         """
-        time, course, status = self.scanned(measure, direction)
-        if measure.rule == "peak-to-peak" and _by_place(measure, measure.against_nominal(self.run.system)):
-            return WorstPlace(np.nan, _widest(course), Status.SOLVED)
+        time, course, status = self.scanned(measure, of_worst)
+        if measure.rule == "peak-to-peak" and self._by_place(measure):
+            widest = FirstOrder(self.effects, _widest(course))
+            return WorstPlace(np.nan, widest, widest, Status.SOLVED)
+        walked = self._scans[measure.name]
         for round_ in range(ROUNDS):
             if round_:
                 walked = self._walked([measure], time)[measure.name]
-                course, status = self._course(measure, walked.parts, direction), walked.status
+                course, status = self._course(measure, walked.parts, of_worst), walked.status
             top = int(np.argmax(np.where(sound(status), np.nan_to_num(size(course), nan=-np.inf), -np.inf)))
-            worst = WorstPlace(float(time[top]), course.slope[:, top], int(status[top]))
+            place = float(time[top])
             if len(time) == 1:
                 break
             time = np.linspace(time[max(top - 1, 0)], time[min(top + 1, len(time) - 1)], AROUND)
-            time = np.sort(np.append(time, worst.time))
-        return worst
+            time = np.sort(np.append(time, place))
+        parts = [Dual(part.real[:, [top]], part.dual[:, [top]]) for part in walked.parts]
+        worst, scatter = (
+            FirstOrder(self.effects, self._course(measure, parts, each).slope[:, 0]) for each in (True, False)
+        )
+        return WorstPlace(place, worst, scatter, int(status[top]))
 
     def _walked(self, measures: Sequence[Measure], time: Array) -> dict[str, Walked]:
         """The courses of some measures with their derivatives at times, s, some of the times at once."""
@@ -296,14 +311,17 @@ class ToleranceStudy:
             for name, course in parts.items()
         }  # fmt: skip
 
-    def _course(self, measure: Measure, parts: Sequence[Dual], direction: Direction = "scatter") -> FirstOrder:
-        """First order of the one number a position that stands for a course."""
+    def _course(self, measure: Measure, parts: Sequence[Dual], of_worst: bool) -> FirstOrder:
+        """First order of the one number a position that stands for a course.
+
+        of_worst: of a distance along the direction in which its worst case is largest, not its scatter.
+        """
         slope = parts[0].dual
         if measure.kind == "path_error":
             slopes = np.array([part.dual for part in parts])  # (axis, row, time)
             scaled = np.nan_to_num(slopes * self.effects.weights[:, None])
             along = np.linalg.eigh(np.einsum("art,brt->tab", scaled, scaled))[1][:, :, -1]  # (time, axis)
-            for _ in range(TURNS if direction == "worst" else 0):  # Σ |u·s| does not fall from one to the next
+            for _ in range(TURNS if of_worst else 0):  # Σ |u·s| does not fall from one to the next
                 total = np.einsum("art,rt->ta", scaled, np.sign(np.einsum("art,ta->rt", scaled, along)))
                 size = np.linalg.norm(total, axis=1, keepdims=True)
                 along = np.divide(total, size, out=along, where=size > 0)
@@ -319,25 +337,26 @@ class ToleranceStudy:
 
     # ---- figures ------------------------------------------------------------------------------------------
 
-    def _order(self, measure: Measure, against: bool, read: Read | None) -> MeasureOrder:
+    def _order(self, measure: Measure, read: Read | None) -> MeasureOrder:
         """First order of one measure. read: of its figure, where that has derivatives."""
-        effects, name = self.effects, measure.name
-        nominal, time, lead, status = self.many.figures[name], self.many.times[name], None, int(Status.SOLVED)
+        effects, name, by_place = self.effects, measure.name, self._by_place(measure)
+        time, status = self.many.times[name], int(Status.SOLVED)
         if read is not None:
             value, slope = effects.slopes(read.figure, ())
             slope = np.where(np.isfinite(value), slope, np.nan)  # of what does not exist
             if measure.rule == "value" and not measure.in_time:
                 time, status = float(self.many.spots(measure)[0]), int(read.status[0])
+            figure = worst = FirstOrder(effects, effects.without_noise(slope))
         else:
             place = self.worst_place(measure, lambda course: course.total.worst)
-            lead = FirstOrder(effects, place.slope)
-            slope = np.full(len(place.slope), np.nan)
-            if _by_place(measure, against):
-                time, slope, status = place.time, place.slope, place.status
-        figure = FirstOrder(effects, effects.without_noise(slope))
-        total = self._ends(measure, figure.total) if _by_place(measure, against) else figure.total
-        rests = status == Status.ZERO_SLIP
-        return MeasureOrder(measure, nominal, against, figure, total, time, rests, lead or figure)
+            figure, worst = FirstOrder(effects, np.full(len(effects.rows), np.nan)), place.worst
+            if by_place:
+                time, figure, status = place.time, place.scatter, place.status
+        total = figure.total
+        if by_place:
+            total = self._ends(measure, total._replace(lower=worst.total.lower, upper=worst.total.upper))
+        against, rests = measure.against_nominal(self.run.system), status == Status.ZERO_SLIP
+        return MeasureOrder(measure, self.many.figures[name], against, by_place, figure, worst, total, time, rests)
 
     def _ends(self, measure: Measure, total: Spread) -> Spread:
         """Least and largest deviation of a figure that is made of the deviations at all places.
@@ -348,7 +367,7 @@ class ToleranceStudy:
 
         def extreme(end: str, sign: float) -> Array:
             place = self.worst_place(measure, lambda course: sign * getattr(course.total, end))
-            return np.asarray(getattr(FirstOrder(self.effects, place.slope).total, end))
+            return np.asarray(getattr(place.worst.total, end))
 
         lower, upper = total.lower, total.upper
         if measure.kind == "path_error" or measure.rule in ("peak-to-peak", "largest"):
@@ -409,22 +428,6 @@ def sound(status: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Places away from dead centres, of which first order says little; all if there are no others."""
     solved = status < Status.NEAR_SINGULAR
     return solved | ~np.any(solved)
-
-
-def _by_place(measure: Measure, against: bool) -> bool:
-    """See `MeasureOrder.by_place`."""
-    if measure.kind == "path_error":
-        return measure.rule in ("deviation", "value", "maximum", "largest")
-    return measure.rule == "deviation" or (
-        against and measure.rule in ("maximum", "minimum", "largest", "peak-to-peak")
-    )
-
-
-def _rated(measure: Measure, against: bool) -> bool:
-    """Whether the figure has derivatives at the nominal mechanism, which those of most deviations from it have not."""
-    if _by_place(measure, against) or measure.kind == "path_error":
-        return False
-    return measure.rule in ("mean", "value") or not against
 
 
 def _widest(course: FirstOrder) -> Array:

@@ -30,9 +30,6 @@ __all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
 Array = NDArray[np.float64]
 # units: "measure": that of each figure; "curve": of each course; "parameter": of each parameter; "ratio" and "curve
 # ratio": the former over the latter; "drive": deg, mm or s, as `drive_unit` says
-CURVES = {
-    "worst_case_lower": "lower", "worst_case_upper": "upper", "rss": "half", "shift": "shift", "deviation": "deviation"
-}  # fmt: skip
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
 
 
@@ -206,15 +203,18 @@ def _linear(study: ToleranceStudy, table: Table) -> dict[str, Any]:
         "place": np.array(places, float),
         **{f"parameter_{key}": array for key, array in study.effects.numbers().items()},
         "sensitivity": np.array([of.figure.sensitivity for of in rows]),
-        "contribution_worst_case": np.array([of.figure.spread.worst for of in rows]),
+        "contribution_worst_case": np.array([(of.worst if of.by_place else of.figure).spread.worst for of in rows]),
         "contribution_rss": shares,
         "contribution_variance": variance,
         "worst_case_lower": total.lower, "worst_case_upper": total.upper, "rss": total.half,
         "shift_linear": total.shift, "deviation_linear": total.deviation,
         "curve": table.spread(table.curves),
         "curve_sensitivity": table.spread([course.sensitivity for course in table.courses]),
-        **{f"curve_{name}": table.spread([getattr(course.total, part) for course in table.courses])
-           for name, part in CURVES.items()},
+        **{f"curve_{name}": table.spread([getattr(course.total, part) for course in courses])
+           for courses, parts in (
+               (table.worst, {"worst_case_lower": "lower", "worst_case_upper": "upper"}),
+               (table.courses, {"rss": "half", "shift": "shift", "deviation": "deviation"}),
+           ) for name, part in parts.items()},
         "status": table.status,
     }  # fmt: skip
 

@@ -15,7 +15,7 @@ import trunnion
 from drawn import line, outside, texts
 from trunnion.errors import MechanismError
 from trunnion.results.save import save as export
-from trunnion.studies.tolerance.sampled import QUANTILES
+from trunnion.studies.tolerance.result import QUANTILES
 from trunnion.views import draw
 from trunnion.views.allocation import trade_off
 from trunnion.views.charts import Band, Rule

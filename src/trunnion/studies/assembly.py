@@ -133,11 +133,8 @@ def assemble(
 def _regular(system: System, values: Values, cycle: Cycle, time: Array) -> Answer:
     """Every loop has as many equations as coordinates: it closes as it is, or not at all."""
     chosen = choose(system, values, cycle)
-    walk = forward(system, values, chosen.assembly, time)
-    closes = np.ones(len(time), bool)
-    for pose in walk.poses:
-        for frame in pose.frames:
-            closes &= np.isfinite(sum(primal(number) for number in flat(frame)))
+    frames = [frame for pose in forward(system, values, chosen.assembly, time).poses for frame in pose.frames]
+    closes = np.isfinite(np.zeros(len(time)) + sum(primal(number) for frame in frames for number in flat(frame)))
     arrays = _blank(system, values, time)
     for name in ("needed_share", "needed_clearance", "open_angle", "open_length", "certificate", "closure_residual"):
         arrays[name] = np.where(closes, 0.0, np.nan)
@@ -225,7 +222,15 @@ class AssemblyStudy:
             for width in [sum(len(end.axes) for end in ends)]
         )
         if np.any(opened):
-            _check_lengths(self.system, self.values, self.pins)
+            findings = []
+            for name in dict.fromkeys(end.joint for end in self.pins):
+                model = CLEARANCE_MODELS["spatial"][self.system.joints[name][0]]
+                if model.size and not np.all(primal(shifts.length_of(model, self.values, name)) > 0):
+                    part, keys = model.size
+                    what = f"how far the {part} can lean in its play depends on its length, which is not stated"
+                    findings.append(Finding(what, f"joints.{name}.{part}", f"state {' or '.join(keys)}: 20 mm"))
+            if findings:
+                raise MechanismError(findings)
             shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
 
         def larger(of: Callable[[LeastPlay], Array]) -> Array:
@@ -304,19 +309,6 @@ class AssemblyStudy:
             most, reach = np.maximum(most, better), reach / 4
         top = int(np.argmax(most))
         return float(most[top]), float(best[top])
-
-
-def _check_lengths(system: System, values: Values, ends: Sequence[End]) -> None:
-    """MechanismError for every play that has no length over which a pin or guide could lean."""
-    findings = []
-    for name in dict.fromkeys(end.joint for end in ends):
-        model = CLEARANCE_MODELS["spatial"][system.joints[name][0]]
-        if model.size and not np.all(primal(shifts.length_of(model, values, name)) > 0):
-            part, keys = model.size
-            what = f"how far the {part} can lean in its play depends on its length, which is not stated"
-            findings.append(Finding(what, f"joints.{name}.{part}", f"state {' or '.join(keys)}: 20 mm"))
-    if findings:
-        raise MechanismError(findings)
 
 
 # ---- the answer in words --------------------------------------------------------------------------------------

@@ -91,7 +91,7 @@ def corner_of(mechanism: Mechanism, name: str, side: str | None, steps: int) -> 
         nearest to where it stands, and that in words, None of a figure of the whole cycle; rows: numbers that matter,
         [name, nominal, change]; scene: of the mechanism there, its errors being those against the nominal one.
     """
-    from trunnion.studies.tolerance.corner import worst_corner  # it takes long to load
+    from trunnion.studies.tolerance.linear import worst_corner  # it takes long to load
 
     corner = worst_corner(mechanism, name, side)
     run, time = corner.prepared.run, corner.time

@@ -25,10 +25,8 @@ from trunnion.model.checks.check import check_values
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.results.scales import extreme_place
-from trunnion.studies.tolerance.indices import Indices
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, limited
-from trunnion.studies.tolerance.sampled import CAUSES
-from trunnion.studies.tolerance.sampling import Samples
+from trunnion.studies.tolerance.sampling import Indices, Samples
 from trunnion.studies.tolerance.search import Corner
 
 __all__ = ["Outcome", "findings_of", "summary"]
@@ -129,7 +127,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
         done = int(sampled["samples"])
         for code, count in enumerate(map(int, sampled["failed"])):
             if count:
-                why = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
+                why = list(Status)[code].text if code < len(Status) else "a figure does not exist"
                 what = f"{count:,} of {counted(done, 'sample')} ({count / done:.2%}) could not be solved: {why}"
                 remedy = "they count as outside every limit; mean and standard deviation are of the others"
                 figures = {"count": count, "samples": done, "share": count / done}

@@ -15,9 +15,8 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies import batch
-from trunnion.studies.tolerance.indices import indices
 from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
-from trunnion.studies.tolerance.sampling import Samples, Sampling
+from trunnion.studies.tolerance.sampling import Samples, Sampling, indices
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -210,9 +210,3 @@ def test_without_dask_the_remedy_is_told() -> None:
     assert ended.stderr.splitlines()[-1].endswith(
         "error: cluster: a cluster needs the package distributed — pip install 'trunnion[cluster]'"
     )
-
-
-def test_dask_is_not_imported_unasked() -> None:
-    script = "import sys, trunnion.studies.batch; print('distributed' in sys.modules)"
-    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=True)
-    assert ended.stdout == "False\n"

@@ -277,12 +277,11 @@ def settings(job: Job) -> dict[str, Any]:
     """All that the answer depends on, by name; what is not a single value stands by its SHA-256, in 12 digits."""
     single = (str, int, float, bool, type(None))
     identity = {"version": __version__, **job.identity()}
-    return {key: value if isinstance(value, single) else _hash(value) for key, value in identity.items()}
-
-
-def _hash(value: object) -> str:
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    for key, value in identity.items():
+        if not isinstance(value, single):
+            text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
+            identity[key] = hashlib.sha256(text.encode()).hexdigest()[:12]
+    return identity
 
 
 def _plain(value: object) -> object:

@@ -360,7 +360,15 @@ class Points:
             return False
         if any(module.redundant for module in run.system.plan.modules):
             return False
-        alike = all(self._like(index) for index in self._probes())
+        # looked at are points along every name from the first, and the corners
+        first, most = tuple(0 for _ in self.shape), PROBES_FOLLOWED if self._followed else PROBES
+        along = [
+            (*first[:axis], int(i), *first[axis + 1 :])
+            for axis, count in enumerate(self.shape)
+            for i in np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+        ]
+        corners = product(*({0, count - 1} for count in self.shape))
+        alike = all(self._like(index) for index in dict.fromkeys([*along, *corners]))
         # what a joint is turned by its errors is told from the start of its own cycle, which a followed group has alone
         return alike and not (self._followed and self.erring)
 
@@ -368,16 +376,6 @@ class Points:
     def _followed(self) -> bool:
         """Whether any group is followed along the cycle of the first point."""
         return any(hasattr(assembly, "pose") for assembly in self.run.chosen.assembly)
-
-    def _probes(self) -> list[Index]:
-        """Points along every name from the first, and the corners."""
-        first, most = tuple(0 for _ in self.shape), PROBES_FOLLOWED if self._followed else PROBES
-        along = [
-            (*first[:axis], int(i), *first[axis + 1 :])
-            for axis, count in enumerate(self.shape)
-            for i in np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
-        ]
-        return list(dict.fromkeys([*along, *product(*({0, count - 1} for count in self.shape))]))
 
     def _like(self, index: Index) -> bool:
         """Whether a point by itself has the numbers that one pass would give it, and the same tables and open ends."""

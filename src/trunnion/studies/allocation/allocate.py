@@ -32,7 +32,7 @@ from trunnion.studies.allocation.problem import (
     none,
 )
 from trunnion.studies.allocation.result import CLOSE, DEFAULT_YIELD, Allocated, dataset, share_of
-from trunnion.studies.allocation.rows import Rows, rows_of
+from trunnion.studies.allocation.rows import Rows, joined, rows_of
 from trunnion.studies.allocation.solve import cheapest
 from trunnion.studies.allocation.yields import meet
 from trunnion.studies.tolerance.linear import ToleranceStudy, study
@@ -311,7 +311,7 @@ class _Rounds:
         contributions = tuple(_contribution(name, self.prices.get(name)) for name in now.inputs.names)
         rows = everything = rows_of(now, _stated(now, self.prices), self.criterion, tight)
         for count in range(ROUNDS):
-            everything = rows.with_moving(everything) if count else rows
+            everything = joined([rows, everything.picked(everything.moving)]) if count else rows
             problem = AllocationProblem(contributions, everything.effects)
             outside = _nominal_outside(now)
             answer = none(problem, outside) if outside else self.solved(problem)

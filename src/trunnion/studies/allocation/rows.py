@@ -54,12 +54,8 @@ class Rows:
         effects = replace(self.effects, **columns)
         return replace(self, effects=effects, measure=self.measure[which], moving=self.moving[which])
 
-    def with_moving(self, other: Rows) -> Rows:
-        """These rows, and those of others that move."""
-        return _joined([self, other.picked(other.moving)])
 
-
-def _joined(parts: Sequence[Rows]) -> Rows:
+def joined(parts: Sequence[Rows]) -> Rows:
     """All rows of several."""
     effects = [part.effects for part in parts]
     columns: dict[str, Any] = {key: np.concatenate([getattr(each, key) for each in effects]) for key in NUMBERS}
@@ -110,10 +106,16 @@ def rows_of(
 
         worst = study.worst_place(order.measure, used, of_worst)
         add(k, worst.worst if of_worst else worst.scatter, np.array([worst.time]), True)
-    rows = _joined(parts)
+    rows = joined(parts)
     limited = [k for k in range(len(orders)) if np.any(np.isfinite(ends[k]))]
     unknown = tuple(orders[k].measure.name for k in limited if k not in rows.measure)
-    correlation = _correlation(study) if criterion == "yield" and study.effects.correlated else None
+    correlation = None
+    if criterion == "yield" and study.effects.correlated:  # of all that varies, by their covariance
+        covariance = study.inputs.population.covariance()
+        size, count = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))), len(covariance)
+        correlation = np.eye(len(study.inputs.names))
+        correlation[:count, :count] = np.divide(covariance, size, out=np.zeros_like(covariance), where=size > 0)
+        np.fill_diagonal(correlation, 1.0)
     return replace(rows, effects=replace(rows.effects, correlation=correlation), unknown=unknown)
 
 
@@ -186,13 +188,3 @@ def _rates(tolerance: Tolerance) -> tuple[float, float, float]:
     )
     drift = (wide.mean - narrow.mean) / (half / 2)
     return wide.deviation / half, drift, wide.mean - middle - drift * half
-
-
-def _correlation(study: ToleranceStudy) -> Array:
-    """Correlation of all that varies, by their covariance."""
-    covariance = study.inputs.population.covariance()
-    size = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
-    matrix, count = np.eye(len(study.inputs.names)), len(covariance)
-    matrix[:count, :count] = np.divide(covariance, size, out=np.zeros_like(covariance), where=size > 0)
-    np.fill_diagonal(matrix, 1.0)
-    return matrix

@@ -52,7 +52,15 @@ def meet(problem: AllocationProblem, target: float, verify: Verify | None = None
     -------
     The answer, with a finding `yield.missed` where no margin meets the target or fresh samples speak against it.
     """
-    problem = replace(problem, caps=_largest_margins(problem))
+    # the margin that each row can have at most, with the narrowest half widths: of a measure the least
+    sigma, room = _spread_and_room(problem, problem.narrowest())
+    deviation = np.sqrt(np.sum(sigma**2, axis=1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        caps = np.where(deviation > 0, np.min(room, axis=0) / deviation, np.inf)
+    labels = np.array(problem.effects.labels or [""] * len(caps))
+    for label in set(labels.tolist()):
+        caps[labels == label] = np.min(caps[labels == label])
+    problem = replace(problem, caps=np.maximum(caps, LEAST))
 
     def normal(tolerances: Array) -> SampledYield:
         share = normal_yield(problem, tolerances)
@@ -149,18 +157,6 @@ class _Margins:
                 answer = replace(answer, expected=expected, sampled=self.yields[key])
             self.answers[z] = answer
         return self.answers[z]
-
-
-def _largest_margins(problem: AllocationProblem) -> Array:
-    """The margin that each row can have at most, with the narrowest half widths, (row,): of a measure the least."""
-    sigma, room = _spread_and_room(problem, problem.narrowest())
-    deviation = np.sqrt(np.sum(sigma**2, axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        margins = np.where(deviation > 0, np.min(room, axis=0) / deviation, np.inf)
-    labels = np.array(problem.effects.labels or [""] * len(margins))
-    for label in set(labels.tolist()):
-        margins[labels == label] = np.min(margins[labels == label])
-    return np.maximum(margins, LEAST)
 
 
 def _spread_and_room(problem: AllocationProblem, tolerances: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ has a random size and a direction that is uniform over a turn.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -109,25 +109,23 @@ class Inputs:
         def moves(number: Number, i: int) -> bool:
             return bool(np.any(np.broadcast_to(np.asarray(derivative(number), float), (2 * count, 1))[i]))
 
-        directions: dict[int, int] = {}
-        for sizes, angle in self._directed(values):
-            turning = [i for i in angles if moves(values[angle], count + i)]
-            numbers = [i for i in range(count) if i not in angles and any(moves(size, i) for size in sizes)]
-            directions.update({i: turning[0] for i in numbers if turning})
-        return directions
-
-    def _directed(self, values: Mapping[str, Number]) -> Iterator[tuple[tuple[Number, ...], str]]:
-        """Sizes, and the path of the direction they point in: of misaligned axes and of seats that are given."""
+        # sizes, and the path of the direction they point in: of misaligned axes and of seats that are given
+        directed: list[tuple[Sequence[Number], str]] = []
         for joint in self.run.system.joints:
             path = f"joints.{joint}.misalignment"
             aside = "offset_towards" if f"{path}.offset_towards" in values else "towards"
-            for size, angle in (("tilt", "towards"), ("offset", aside)):
-                if {f"{path}.{size}", f"{path}.{angle}"} <= values.keys():
-                    yield (values[f"{path}.{size}"],), f"{path}.{angle}"
+            for size, angle in ((f"{path}.tilt", f"{path}.towards"), (f"{path}.offset", f"{path}.{aside}")):
+                if {size, angle} <= values.keys():
+                    directed.append(([values[size]], angle))
         for joint in self.held:
-            for angle in (f"joints.{joint}.seat.{key}" for key in ("xi", "beta")):
-                if angle in values:
-                    yield self.play(joint, values).radii, angle
+            seats = (f"joints.{joint}.seat.{key}" for key in ("xi", "beta"))
+            directed += [(self.play(joint, values).radii, angle) for angle in seats if angle in values]
+        directions: dict[int, int] = {}
+        for sizes, towards in directed:
+            turning = [i for i in angles if moves(values[towards], count + i)]
+            numbers = [i for i in range(count) if i not in angles and any(moves(size, i) for size in sizes)]
+            directions.update({i: turning[0] for i in numbers if turning})
+        return directions
 
     def play(self, joint: str, values: Mapping[str, Number]) -> Play:
         """The play of a loose or held joint with these numbers."""
@@ -151,7 +149,12 @@ class Inputs:
                 turned[tolerance.direction] = (2 * np.pi * next(rest) - np.pi)[:, None]
         values = self.run.system.mechanism.parameters(turned, deviations)
         for joint in self.loose:
-            values.update(self._anywhere(joint, values, rest))
+            play, offsets = self.play(joint, values), []
+            for end, radius in zip(play.model.ends, play.radii, strict=True):
+                unit = within([next(rest) for _ in end])
+                room = np.maximum(radius, 0.0)  # a fit that presses leaves none
+                offsets.append(tuple(room * part[:, None] for part in unit))
+            values.update(play.model.paths(f"{self.carriers(joint)[0]}.{joint}", offsets))
         for joint in self.held:
             values.update(self.seat(joint, values))
         return values
@@ -160,15 +163,6 @@ class Inputs:
         """Offsets of a pin whose seat is given."""
         play = self.play(joint, values)
         return play.model.paths(f"seats.{joint}", given_offsets(values, joint, play))
-
-    def _anywhere(self, joint: str, values: Mapping[str, Number], rest: Iterator[Array]) -> dict[str, Number]:
-        """Offsets of a pin at each end, uniform over the interval, disc or ball, on the link that carries its seat."""
-        play, offsets = self.play(joint, values), []
-        for end, radius in zip(play.model.ends, play.radii, strict=True):
-            unit = within([next(rest) for _ in end])
-            room = np.maximum(radius, 0.0)  # a fit that presses leaves none
-            offsets.append(tuple(room * part[:, None] for part in unit))
-        return play.model.paths(f"{self.carriers(joint)[0]}.{joint}", offsets)
 
 
 def within(u: Sequence[Array]) -> list[Array]:

@@ -18,7 +18,7 @@ from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
 from trunnion.statistics import intervals
-from trunnion.statistics.intervals import Moments, moments_of
+from trunnion.statistics.intervals import moments_of
 from trunnion.studies.tolerance.effects import Spread
 from trunnion.studies.tolerance.findings import Outcome, findings_of, summary
 from trunnion.studies.tolerance.linear import Table, ToleranceStudy
@@ -30,6 +30,14 @@ if TYPE_CHECKING:
 __all__ = ["CAUSES", "QUANTILES", "VARIABLES", "course_text", "dataset", "limits_of", "sampled", "text_of"]
 
 Array = NDArray[np.float64]
+Interval = tuple[Any, Any]
+QUANTILES = (0.00135, 0.005, 0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975, 0.995, 0.99865)
+CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
+FEWEST = 4.0  # points of a replicate expected beyond a quantile, from which its interval is given
+BINS = 240
+CORE, FAR = 0.005, 1.5  # share of the samples at either end, and widths of the others, beyond which bins do not reach
+LEAST = 1e-9, 1e-12  # width of the bins of a figure that does not scatter: of the figure, and SI
+SIZES = 12  # at which it is shown how figures converge
 # units: "measure": that of each figure; "curve": of each course; "parameter": of each parameter; "ratio" and "curve
 # ratio": the former over the latter; "drive": deg, mm or s, as `drive_unit` says
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
@@ -282,15 +290,6 @@ def _where(measure: Measure, system: System) -> str:
 
 # ---- what samples say ----------------------------------------------------------------------------------------------
 
-Interval = tuple[Any, Any]
-QUANTILES = (0.00135, 0.005, 0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975, 0.995, 0.99865)
-CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
-FEWEST = 4.0  # points of a replicate expected beyond a quantile, from which its interval is given
-BINS = 240
-CORE, FAR = 0.005, 1.5  # share of the samples at either end, and widths of the others, beyond which bins do not reach
-LEAST = 1e-9, 1e-12  # width of the bins of a figure that does not scatter: of the figure, and SI
-SIZES = 12  # at which it is shown how figures converge
-
 
 def sampled(samples: Samples, study: ToleranceStudy, table: Table) -> dict[str, Any]:
     """All figures of the samples: arrays by the names of `result.VARIABLES`."""
@@ -303,9 +302,12 @@ def sampled(samples: Samples, study: ToleranceStudy, table: Table) -> dict[str, 
     each = [moments_of(part) for part in np.moveaxis(figure.reshape(count, *replicates), 1, 0)]
     yields = np.mean(everything, axis=1)
     if job.replicates > 1:
+        number, mean, deviation, *_ = np.moveaxis(np.array(each), 1, 0)
+        # by n: the mean of the points of a replicate is all but true and uses none up
+        deviation = deviation * np.sqrt(np.maximum(number - 1, 0) / np.maximum(number, 1))
         ends = {
-            "mean": intervals.by_replicates(np.array([moment.mean for moment in each]), axis=0),
-            "deviation": intervals.by_replicates(np.array([_of_even_points(moment) for moment in each]), axis=0),
+            "mean": intervals.by_replicates(mean, axis=0),
+            "deviation": intervals.by_replicates(deviation, axis=0),
         }
         right = np.sum(everything.reshape(count + 1, *replicates), axis=2)
         # turned to where a measure changes most, a replicate's count is all but one of two numbers: on the safe side
@@ -318,6 +320,12 @@ def sampled(samples: Samples, study: ToleranceStudy, table: Table) -> dict[str, 
         }
     ends["quantile"] = _quantile_ends(ordered, figure.reshape(count, *replicates))
     histogram, edge = _histogram(ordered)
+    gravest = samples.status[np.any(np.isnan(figure), axis=0)]
+    between = [limits_of(measure, order.nominal) for measure, order in zip(job.measures, study.orders, strict=True)]
+    capability = [  # of a largest |deviation|, towards the limits' smaller side
+        intervals.capability(*ends_of, *pair) if np.any(np.isfinite(ends_of)) else (np.nan, np.nan)
+        for ends_of, *pair in zip(between, moments.mean, moments.deviation, strict=True)
+    ]
     arrays: dict[str, Any] = {
         "samples": np.array(done),
         "mean": moments.mean,
@@ -326,7 +334,7 @@ def sampled(samples: Samples, study: ToleranceStudy, table: Table) -> dict[str, 
         "kurtosis": moments.kurtosis,
         "least": np.array([row[0] if row.size else np.nan for row in ordered]),
         "most": np.array([row[-1] if row.size else np.nan for row in ordered]),
-        "failed": _failed(samples),
+        "failed": np.bincount(np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1), minlength=CAUSES),
         "histogram": histogram,
         "edge": edge,
         "quantile_value": np.array([_quantiles(row, np.array(QUANTILES)) for row in ordered]),
@@ -334,24 +342,13 @@ def sampled(samples: Samples, study: ToleranceStudy, table: Table) -> dict[str, 
         "yield_all": yields[-1],
         "yield_all_low": ends["yield"][0][-1],
         "yield_all_high": ends["yield"][1][-1],
-        **_capability(job.measures, study, moments),
+        **dict(zip(("cp", "cpk"), np.array(capability).T, strict=True)),
         "band": _bands(samples, study, table),
         **_convergence(samples),
     }
     for name, (low, high) in ends.items():
         arrays |= {f"{name}_low": low[:count], f"{name}_high": high[:count]}
     return arrays
-
-
-def _of_even_points(moments: Moments) -> Array:
-    """Standard deviation of the points of a replicate, by n: their mean is all but true and uses none up."""
-    return moments.deviation * np.sqrt(np.maximum(moments.number - 1, 0) / np.maximum(moments.number, 1))
-
-
-def _failed(samples: Samples) -> NDArray[np.int64]:
-    """Samples without an answer, by the gravest status of their positions."""
-    gravest = samples.status[np.any(np.isnan(samples.figure), axis=0)]
-    return np.bincount(np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1), minlength=CAUSES)
 
 
 def _quantiles(ordered: Array, shares: Array) -> Array:
@@ -403,16 +400,6 @@ def _histogram(ordered: list[Array]) -> tuple[NDArray[np.int64], Array]:
         edges[i] = np.linspace(least, most, BINS + 1)
         counts[i] = np.histogram(np.clip(row, edges[i, 0], edges[i, -1]), edges[i])[0]
     return counts, edges
-
-
-def _capability(measures: tuple[Measure, ...], study: ToleranceStudy, moments: Moments) -> dict[str, Any]:
-    """C_p and C_pk of the figure between its limits; of a largest |deviation|, towards the limits' smaller side."""
-    cp, cpk = np.full(len(measures), np.nan), np.full(len(measures), np.nan)
-    for i, measure in enumerate(measures):
-        low, high = limits_of(measure, study.orders[i].nominal)
-        if np.isfinite(low) or np.isfinite(high):
-            cp[i], cpk[i] = intervals.capability(low, high, moments.mean[i], moments.deviation[i])
-    return {"cp": cp, "cpk": cpk}
 
 
 def limits_of(measure: Measure, nominal: float) -> tuple[float, float]:

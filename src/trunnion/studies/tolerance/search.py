@@ -55,11 +55,17 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
         if settled or not np.all(np.isfinite(slope)):
             break
         turned = FirstOrder(effects, slope).corner(sign, at)
-        if _same(turned, at):
+        if all(abs(value - at[path]) <= 1e-9 * max(1.0, abs(value)) for path, value in turned.items()):
             break
         at = turned
     for rounds in range(best.rounds + 1, best.rounds + 1 + MOST_ROUNDS):
-        flips = _flips(effects, best.at)
+        flips: list[dict[str, float]] = []  # each number alone at its other limit, or nominal if its limits let it
+        for i, tolerance in enumerate(effects.inputs.tolerances):
+            if not (tolerance.direction or tolerance.distribution == "direction"):
+                nominal = effects.nominal(i)
+                places = {nominal + tolerance.lower, nominal + tolerance.upper}
+                places |= {nominal} if tolerance.lower <= 0.0 <= tolerance.upper else set()
+                flips += [{tolerance.path: to} for to in sorted(places - {best.at.get(tolerance.path, nominal)})]
         if not flips:
             break
         batch = replace(effects, rows=tuple(EffectRow(NOBODY, 0, flip, "") for flip in flips))
@@ -74,24 +80,7 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
     return best._replace(assembles=assembles)
 
 
-def _flips(effects: Effects, at: Mapping[str, float]) -> list[dict[str, float]]:
-    """Each toleranced number alone at its other limit, or at its nominal value if its limits let it."""
-    flips = []
-    for i, tolerance in enumerate(effects.inputs.tolerances):
-        if tolerance.direction or tolerance.distribution == "direction":
-            continue
-        nominal = effects.nominal(i)
-        within = {nominal} if tolerance.lower <= 0.0 <= tolerance.upper else set()
-        places = {*within, nominal + tolerance.lower, nominal + tolerance.upper} - {at.get(tolerance.path, nominal)}
-        flips += [{tolerance.path: place} for place in sorted(places)]
-    return flips
-
-
 def _better(best: Corner, trial: Corner, sign: float) -> Corner:
     gain = sign * (trial.value - best.value)
     least = 1e-12 * abs(best.value) if np.isfinite(best.value) else 0.0
     return trial if np.isfinite(trial.value) and (not np.isfinite(best.value) or gain > least) else best
-
-
-def _same(corner: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    return all(abs(value - other[path]) <= 1e-9 * max(1.0, abs(value)) for path, value in corner.items())

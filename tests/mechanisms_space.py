@@ -17,7 +17,10 @@ from scipy import optimize
 from mechanisms_parts import joined
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, element, point, rotation, unrolled
 
-__all__ = ["MODELS", "Drawn", "cardan", "chain", "closed", "draw", "floating", "frame_of", "random_rotation", "rssr"]
+__all__ = [
+    "MODELS", "NAMES", "Drawn", "cardan", "chain", "closed", "draw", "floating", "frame_of", "random_rotation", "rssr",
+    "with_friction",
+]  # fmt: skip
 
 REACH = 0.15  # of the drawn drivers on both sides of the drawn pose, rad or m/10
 SPEED = 3.0
@@ -375,3 +378,31 @@ def floating(nut: str) -> tuple[Data, Data]:
         "U": {"type": "universal", "links": ["ring", nut]},
     }
     return links, joints
+
+
+CARDANS: dict[str, Data] = {
+    "Cardan joint of Pezzuti": cardan(),
+    "Cardan joint, their sum": cardan(model="pezzuti"),
+    "Cardan joint at 45 degrees under gravity": {**cardan(0.08, 45.0, 0.5, 30.0), "gravity": [3.0, -5.0, 8.0]},
+    "Cardan joint with clean angles": cardan(error=0.0, offset=0.0),
+}
+NAMES = [*MODELS, "RSSR of the theory", *CARDANS]
+FRICTION = {"RSSR of the theory": 0.15, **dict.fromkeys(CARDANS, 0.42), "two loops in one group": 0.02}  # others 0.05
+FRICTION["Cardan joint at 45 degrees under gravity"] = 0.15
+
+
+def with_friction(name: str, friction: bool) -> Data:
+    """One of all these, with friction or without."""
+    if name in CARDANS:
+        data = {**CARDANS[name], "drivers": {"input": {"speed": 100.0, "start": 0.07}}}  # at 0 a pin is at rest
+    else:
+        data = dict(rssr().data if name == "RSSR of the theory" else MODELS[name]().data)
+    defaults = dict(data.get("joint_defaults", {}))
+    law = defaults.pop("friction", {})
+    if friction:
+        model = {"model": law["model"]} if isinstance(law, dict) and "model" in law else {}
+        defaults["friction"] = {"coefficient": FRICTION.get(name, 0.05), **model}
+        for joint in data.get("joints", {}).values():
+            if joint["type"] in ("planar", "fixed"):
+                joint["friction"] = 0.0
+    return {**data, "joint_defaults": defaults}

@@ -102,14 +102,14 @@ _GROUPS = (
         "groups/tree.py",
         "            total = algebra.added(total, bracket(twist, part))\n            if not motion.together:\n",
         "            if not motion.together:\n                total = algebra.added(total, bracket(twist, part))\n",
-        ("tests/invariants/test_spatial_groups.py", "-k", "accelerations or free_spin"),
+        ("tests/reference/test_judged.py", "-k", "in_space"),
     ),
     Fault(
         "freedoms-do-not-carry-those-after-them",
         "groups/tree.py",
         "            if not motion.together:\n                twist",
         "            if motion is None:\n                twist",
-        ("tests/invariants/test_spatial_groups.py", "-k", "accelerations"),
+        ("tests/reference/test_judged.py", "-k", "in_space"),
     ),
     Fault(
         "dyad-carried-sign",
@@ -252,14 +252,14 @@ _SOLVE = (
         "solve/forward.py",
         "plus(apply(tensor, change), cross(w, apply(tensor, w)))",
         "apply(tensor, change)",
-        ("tests/reference/test_newton_euler_space.py",),
+        ("tests/reference/test_judged.py", "-k", "in_space"),
     ),
     Fault(
         "friction-of-one-pin-of-a-cross-not-felt",
         "solve/contacts.py",
         "unit, still, amount=share * rate, felt=True)",
         "unit, still, amount=share * rate)",
-        ("tests/reference/test_newton_euler_space.py",),
+        ("tests/reference/test_judged.py", "-k", "in_space"),
     ),
     Fault(
         "screw-thread-lead-sign",

@@ -209,18 +209,17 @@ class Planar:
                     continue  # a difference of neighbours as well
                 self.verdict.note("motion", f"driver {name}", self.result(what + suffix, name) - wanted, scale)
         for gear in self.data.get("gears", {}).values():
-            one, two = gear["joints"]
+            one, two = self.turns_first(gear)
+            way, ratio = ("slide", gear["radius"]) if "radius" in gear else ("rotation", gear["ratio"])
             for rate in ("_velocity", "_acceleration"):
-                a, b = (self.result(f"joint_rotation{rate}", joint) for joint in (one, two))
-                scale = np.abs(gear["ratio"] * a) + np.abs(b)
-                self.verdict.note("motion", f"gears {one}, {two}", b - gear["ratio"] * a, scale)
-            turns = [self.result("joint_rotation", joint) for joint in (one, two)]
-            off = turns[1] - gear["ratio"] * turns[0] - gear["phase"]
-            step = abs(gear["ratio"]) % 1  # the rotations that the results tell are known but for whole turns
+                a, b = self.result(f"joint_rotation{rate}", one), self.result(f"joint_{way}{rate}", two)
+                self.verdict.note("motion", f"gears {one}, {two}", b - ratio * a, np.abs(ratio * a) + np.abs(b))
+            off = self.result(f"joint_{way}", two) - ratio * self.result("joint_rotation", one) - gear["phase"]
+            # the rotations that the results tell are known but for whole turns
+            step = ratio if way == "slide" else abs(ratio) % 1
             turn = 2 * np.pi * (step if 0 < step < 1 else 1)
-            self.verdict.note(
-                "motion", f"gears {one}, {two}", (off + turn / 2) % turn - turn / 2, np.maximum(1.0, np.abs(off))
-            )
+            scale = self.length if way == "slide" else np.maximum(1.0, np.abs(off))
+            self.verdict.note("motion", f"gears {one}, {two}", (off + turn / 2) % turn - turn / 2, scale)
 
     # ---- forces ---------------------------------------------------------------------------------------------
 
@@ -362,9 +361,33 @@ class Planar:
             self.verdict.note("power", name, lost + friction * self.rate(name), self.largest_power)
             self.verdict.note("power", name, np.minimum(lost, 0.0), self.largest_power)
 
+    def turns_first(self, gear: Data) -> list[str]:
+        """The joints of a gear pair; of a rack that which turns comes first, however they are listed."""
+        return sorted(gear["joints"], key=lambda joint: self.data["joints"][joint]["type"] == "prismatic")
+
+    def rack(self, name: str, gear: Data) -> None:
+        """The teeth of a rack press where the pinion rolls on it, inclined by the pressure angle."""
+        turning, sliding = self.turns_first(gear)
+        first, second = (self.data["joints"][joint]["links"] for joint in (turning, sliding))
+        carrier = next(link for link in first if link in second)
+        pinion, toothed = (next(link for link in pair if link != carrier) for pair in (first, second))
+        u, force = self.axis(sliding), self.result("gear_force", name)  # on the rack
+        sense = (1 if first[1] == pinion else -1) * (1 if second[1] == toothed else -1)
+        out = -sense * quarter(u)  # from the middle of the pinion
+        self.act(toothed, self.at(carrier, turning) + gear["radius"] * out, force)
+        self.act(pinion, self.at(carrier, turning) + gear["radius"] * out, -force)
+        angle = float(gear.get("pressure_angle", np.radians(20)))
+        self.apart[f"gear {name}"] = dot(force, out), np.abs(dot(force, u)) * np.tan(angle)
+        about = -gear["radius"] * cross(out, force) * (1 if first[1] == pinion else -1)
+        torque = self.result("gear_torque", name)
+        self.verdict.note("balance", f"gear {name}", about - torque, np.abs(torque) + size(force) * self.length)
+
     def gears(self) -> None:
         """Teeth press at the pitch point, inclined by the pressure angle; a train passes torques."""
         for name, gear in self.data.get("gears", {}).items():
+            if "radius" in gear:
+                self.rack(name, gear)
+                continue
             first, second = (self.data["joints"][joint]["links"] for joint in gear["joints"])
             torque, ratio = self.result("gear_torque", name), gear["ratio"]
             nothing = np.zeros((2, self.count))

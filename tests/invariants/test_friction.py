@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import trunnion
-from mechanisms import DURANGO, eccentric_press
-from trunnion import FrictionMethod, Mechanism, Status
+from mechanisms import eccentric_press
+from trunnion import FrictionMethod
 from trunnion.algebra.dual import derivative, primal, seed
 from trunnion.joints.contact_loads import ContactLoad, GuideLoad, PinLoad, Reaction
 from trunnion.joints.friction import FRICTION_LAWS
@@ -127,23 +126,6 @@ def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
         )
         assert derivative(found.forces[0]) == pytest.approx(expected, rel=1e-12)
         assert primal(found.forces[0]) == pytest.approx(0.49 * (1.0 if expected == 0 else 2.0 / (1 + 0.5 * 0.49)))
-
-
-NAMES = ("offset-slider-crank", "pezzuti-cardan", "fourbar-with-play", "rssr", "geared-five-bar")
-
-
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("method", ["newton", "successive-approximation"])
-def test_the_residual_is_a_result(name: str, method: str) -> None:
-    """In the plane and in space, with seats and gears; of a mechanism with 0.2 N of friction and of one with 10 kN."""
-    result = trunnion.analyse(Mechanism.read(DURANGO.with_name(f"{name}.yaml")), 36, replace(NEWTON, name=method))
-    solved = result["status"].values <= Status.NEAR_SINGULAR
-    assert np.all(np.isfinite(result["friction_residual"].values[solved]))
-    moment, force = (np.abs(result[key]).max("joint").values for key in ("friction_torque", "friction_force"))
-    assert np.any(moment[solved] + force[solved] > 0)
-    thickest = 10.02e-3  # m, of the pins of these: no friction force is less than its torque over it
-    assert np.all(result["friction_residual"].values[solved] <= 1e-10 * np.maximum(moment / thickest, force)[solved])
 
 
 def test_single_positions_of_an_eccentric_press() -> None:

@@ -390,20 +390,15 @@ FREE = 0.62  # m: within the lengths that the spring goes through
 def test_a_rope_and_a_bumper_are_halves_of_the_spring(damping: float, preload: float) -> None:
     """Where one acts it is the spring of both ways, where it does not there is nothing; so with the drive torque."""
     stated = {"stiffness": 900.0, "free_length": FREE, "damping": damping}
-    both = analysed(spring_four_bar(**stated, preload=preload), 180)
-    pull = analysed(spring_four_bar(**stated, preload=preload, only="pull"), 180)
-    beyond = both["spring_elongation"].values[0] > 0
-    assert 10 < np.count_nonzero(beyond) < 170
-    for name in ("spring_force", "spring_power", "damping_power", "drive_effort"):
-        np.testing.assert_allclose(pull[name][0], np.where(beyond, both[name][0], 0.0), rtol=1e-12, atol=1e-12)
-    np.testing.assert_array_equal(pull["spring_elongation"], both["spring_elongation"])
-    push = analysed(spring_four_bar(**stated, preload=-preload, only="push"), 180)
-    whole = analysed(spring_four_bar(**stated, preload=-preload), 180)
-    for name in ("spring_force", "spring_power", "damping_power", "drive_effort"):
-        np.testing.assert_allclose(push[name][0], np.where(beyond, 0.0, whole[name][0]), rtol=1e-12, atol=1e-12)
-    for one in (pull, push):
-        residual = np.abs(one["power_residual"].values).max()
-        assert residual < 1e-12 * np.abs(one["drive_power"].values).max()
+    for only, sign in (("pull", 1.0), ("push", -1.0)):
+        whole, half = (analysed(spring_four_bar(**stated, preload=sign * preload, **way), 180)
+                       for way in ({}, {"only": only}))  # fmt: skip
+        acts = sign * whole["spring_elongation"].values[0] > 0
+        assert 10 < np.count_nonzero(acts) < 170
+        for name in ("spring_force", "spring_power", "damping_power", "drive_effort"):
+            np.testing.assert_allclose(half[name][0], np.where(acts, whole[name][0], 0.0), rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(half["spring_elongation"], whole["spring_elongation"])
+        assert np.abs(half["power_residual"].values).max() < 1e-12 * np.abs(half["drive_power"].values).max()
 
 
 def cart(**more: Any) -> Data:

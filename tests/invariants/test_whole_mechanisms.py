@@ -12,7 +12,6 @@ from brief import brief
 from mechanisms import MODELS, Data, build, in_units, law_named, model, transformed
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.solve.run import prepare
 
 STEPS = 24
 VECTORS = ["point_position", "point_velocity", "point_acceleration", "reaction_force"]
@@ -33,45 +32,6 @@ def same(a: Any, b: Any, name: str, tolerance: float = 1e-10) -> None:
 def unchanged(name: str) -> Any:
     """The result that those of the changed models are compared with, made once."""
     return brief(Mechanism(**model(MODELS[name]())), STEPS)
-
-
-@pytest.mark.spread(10)
-@pytest.mark.parametrize("friction", [None, 0.2])
-@pytest.mark.parametrize("name", MODELS)
-def test_power_balance(name: str, friction: float | None) -> None:
-    """drive + loads + inertia − friction = 0 to 1e-12 of the peak drive power, and friction never gives power."""
-    result = brief(build(MODELS[name](), friction=friction), 90)
-    peak = float(np.abs(result["drive_power"]).max())
-    assert np.all(result["status"] <= Status.ZERO_SLIP)
-    assert np.abs(result["power_residual"]).max() < 1e-12 * peak
-    assert np.all(result["friction_power"] >= -1e-15 * peak)
-    assert np.abs(result["closure_residual"]).max() < 1e-13
-    if friction:
-        assert float(result["friction_power"].sum("joint").mean()) > 1e-5 * peak
-
-
-@pytest.mark.spread(8)
-@pytest.mark.parametrize("name", MODELS)
-def test_velocities_and_accelerations_are_derivatives(name: str) -> None:
-    """Eighth-order differences of positions and of velocities along the cycle."""
-    run = prepare(build(MODELS[name]()))
-    time = (np.arange(11) + 0.41) / 11 * run.cycle.duration
-    h = 2e-3 * run.cycle.duration
-    weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
-    walks = [run.solve(time + k * h).walk for k in range(-4, 5)]
-    for link, point in run.system.points:
-        motions = [walk.point(link, point) for walk in walks]
-        for axis in (0, 1):
-            for of, rate in (("place", "velocity"), ("velocity", "acceleration")):
-                samples = [np.broadcast_to(getattr(m, of)[axis], time.shape) for m in motions]
-                expected = np.tensordot(weights, np.array(samples), axes=1)
-                found = np.broadcast_to(getattr(motions[4], rate)[axis], time.shape)
-                np.testing.assert_allclose(found, expected, rtol=0, atol=2e-8 * max(1.0, np.abs(expected).max()))
-    for link in run.system.mechanism.links:
-        speeds = np.array([np.broadcast_to(walk.motions[link].twist.w, time.shape) for walk in walks])
-        found = np.broadcast_to(walks[4].motions[link].acceleration.w, time.shape)
-        expected = np.tensordot(weights, speeds, axes=1)
-        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-8 * max(1.0, np.abs(expected).max()))
 
 
 def as_seen(data: Data, kind: str) -> tuple[Data, dict[str, Any]]:

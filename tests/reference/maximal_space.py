@@ -19,8 +19,8 @@ TURN = 2 * np.pi
 Row = tuple[Any, Any, Any]  # numbers, or one for each of several motions
 
 __all__ = [
-    "Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "in_planes", "point", "raised", "rotation",
-    "turned", "unrolled",
+    "Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "in_planes", "point", "pose_of", "raised",
+    "rotation", "turned", "unrolled",
 ]  # fmt: skip
 
 
@@ -80,6 +80,8 @@ def element(link: Data, name: str) -> Frame:
 
 def unrolled(data: Data) -> Data:
     """A model with a `loop` as one with points on links and joints: what the rows of the table say, in numbers."""
+    if "loop" not in data:
+        return data
     rows, links = data["loop"], dict(data.get("links", {}))
     count = len(rows)
     shift = [Frame(np.array([r.get("distance", 0.0), 0, 0]), rotation([1, 0, 0], r.get("twist", 0.0))) for r in rows]
@@ -100,6 +102,18 @@ def unrolled(data: Data) -> Data:
         link["points"] = {row["joint"]: point(own), following["joint"]: point(next_one @ constant)}
         links[row["link"]] = link
     return {**{key: part for key, part in data.items() if key != "loop"}, "links": links, "joints": joints}
+
+
+def pose_of(frame: Any, i: int = 0) -> Frame:
+    """One of the poses of a link in Trunnion's results, in plane or space."""
+
+    def here(number: Any) -> float:
+        return float(np.ravel(number)[i if np.size(number) > 1 else 0])
+
+    if hasattr(frame, "c"):
+        x, y, c, s = (here(n) for n in frame)
+        return Frame(np.array([x, y, 0.0]), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+    return Frame(np.array([here(n) for n in frame.place]), np.array([[here(n) for n in axis] for axis in frame[:3]]).T)
 
 
 def raised(data: Data) -> Data:

@@ -1,27 +1,25 @@
-"""Newton–Euler equations of a mechanism in plane or space as one dense system: an oracle sharing nothing with Trunnion.
+"""Newton–Euler equations of a mechanism in space as one dense system: an oracle sharing nothing with Trunnion.
 
-Maximal coordinates: every body has its equations (three in the plane, six in space), every joint its unknown reaction
-components, every drive its effort, every body with a free spin an unknown moment about the line of that spin, which
-shows whether the given spin is one that nothing has to hold. The motion (poses, accelerations) is given. No modules, no
-elimination; friction is given, or found by `solve_with_friction`.
+Maximal coordinates: every body has its six equations, every joint its unknown reaction components (a revolute 5, a
+cylindrical 4, a spherical 3 …), every drive its effort, every body with a free spin an unknown moment about the line
+of that spin, which shows whether the given spin is one that nothing has to hold. The motion is given. Three links of a
+closed chain are 18 equations. No modules, no elimination; friction is given, or found by `solve_with_friction`.
 
 Signs. Everything a joint transmits is stated as it acts *on the second body, by the first*, in global axes, moments
-about the joint's point. A wrench is force and moment together: (x, y, m) or six numbers. The ground is the body None.
-Angles and moments in the plane are counter-clockwise positive. SI units.
+about the joint's point. A wrench is force and moment together, six numbers. The ground is the body None. SI units.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Vector = NDArray[np.float64]
 
-__all__ = ["Body", "Joint", "Load", "Rubbing", "Solution", "solve", "solve_with_friction"]
+__all__ = ["Body", "Joint", "Load", "Rubbing", "Solution", "loads_of_bearings", "solve", "solve_with_friction"]
 
 
 @dataclass(frozen=True)
@@ -37,16 +35,16 @@ class Load:
 class Body:
     """A moving body at one position, everything in global axes.
 
-    mass kg; inertia about the centre of mass, kg m² (in space 3 × 3); centre m; acceleration of the centre, m/s²;
-    acceleration and velocity of its rotation, rad/s² and rad/s. free_spin: line about which nothing holds it, if any.
+    mass kg; inertia (3 × 3) about the centre of mass, kg m²; centre m; acceleration of the centre, m/s²; velocity and
+    acceleration of its rotation, rad/s and rad/s². free_spin: line about which nothing holds it, if there is one.
     """
 
     mass: float
     inertia: ArrayLike
     centre: ArrayLike
     acceleration: ArrayLike
+    angular_velocity: ArrayLike
     angular_acceleration: ArrayLike
-    angular_velocity: ArrayLike = 0.0
     loads: Sequence[Load] = field(default=())
     free_spin: ArrayLike | None = None
 
@@ -55,18 +53,17 @@ class Body:
 class Joint:
     """A joint at one position.
 
-    first, second: names of the bodies. point: global point at which the reaction acts and its moment counts (of a guide
-    the joint's point on the second body). axes: in the plane the direction of the slide; in space columns x, y, z of
-    the element on the second body, z being the axis, the direction of the slide, the normal of a planar pair or the
-    second pin of a universal one. other: the first pin of a universal joint. friction: wrench on the second body.
-    driven: an unknown effort along the freedom. A contact in the plane transmits a force along its axis.
+    first, second: names of the bodies. point: global point at which the reaction acts and its moment counts. axes:
+    columns x, y, z of the element on the second body; z is the axis, the direction of the slide, the normal of a planar
+    pair, the second pin of a universal one. other: the first pin of a universal joint. friction: wrench on the second
+    body. driven: an unknown effort along z.
     """
 
     kind: str
     first: str | None
     second: str | None
     point: ArrayLike
-    axes: ArrayLike
+    axes: Vector
     other: ArrayLike = (1.0, 0.0, 0.0)
     pitch: float = 0.0
     friction: ArrayLike = 0.0
@@ -81,24 +78,18 @@ class Solution:
     """
 
     force: dict[str, Vector]
-    moment: dict[str, Any]
+    moment: dict[str, Vector]
     effort: dict[str, float]
     spin: dict[str, float]
 
 
 def wrenches(joint: Joint) -> tuple[list[Vector], Vector]:
     """What the joint can transmit for unit values of its unknowns, and its unit effort."""
-    axes = np.asarray(joint.axes, float)
-    if len(np.ravel(joint.point)) == 2:
-        (x, y, turn), (c, s) = np.eye(3), axes / np.linalg.norm(axes)
-        along, across = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
-        plane = {"revolute": ([x, y], turn), "prismatic": ([across, turn], along), "contact": ([along], across)}
-        return plane[joint.kind]
     none = np.zeros(3)
-    forces = [np.concatenate([n, none]) for n in axes.T]
-    moments = [np.concatenate([none, n]) for n in axes.T]
+    forces = [np.concatenate([n, none]) for n in joint.axes.T]
+    moments = [np.concatenate([none, n]) for n in joint.axes.T]
     along, about = forces[2], moments[2]
-    cross = np.cross(np.asarray(joint.other, float), axes[:, 2])
+    cross = np.cross(np.asarray(joint.other, float), joint.axes[:, 2])
     thread = along - joint.pitch / (2 * np.pi) * about  # no power: F_z ṡ + M_z θ̇ = 0 with ṡ = pitch θ̇/2π
     table = {
         "revolute": ([*forces, *moments[:2]], about),
@@ -117,15 +108,13 @@ def wrenches(joint: Joint) -> tuple[list[Vector], Vector]:
 
 def about(point: ArrayLike, centre: ArrayLike, wrench: Vector) -> Vector:
     """A wrench at a point as one about a centre."""
-    r, count = np.asarray(point, float) - np.asarray(centre, float), len(wrench) // 2 + len(wrench) % 2
-    force, moment = wrench[:count], wrench[count:]
-    turned = [r[0] * force[1] - r[1] * force[0]] if count == 2 else np.cross(r, force)
-    return np.concatenate([force, moment + turned])
+    r = np.asarray(point, float) - np.asarray(centre, float)
+    return np.concatenate([wrench[:3], wrench[3:] + np.cross(r, wrench[:3])])
 
 
 def effect(bodies: Mapping[str, Body], joint: Joint, wrench: Vector) -> Vector:
     """What a wrench at the joint's point adds to the equations of the second body, and its opposite of the first."""
-    parts = {name: np.zeros(len(wrench)) for name in bodies}
+    parts = {name: np.zeros(6) for name in bodies}
     for name, sign in ((joint.second, 1.0), (joint.first, -1.0)):
         if name is not None:
             parts[name] += sign * about(joint.point, bodies[name].centre, wrench)
@@ -159,9 +148,7 @@ def right(bodies: Mapping[str, Body], joints: Mapping[str, Joint], gravity: Arra
     parts = []
     for body in bodies.values():
         inertia, w = np.asarray(body.inertia, float), np.asarray(body.angular_velocity, float)
-        turned = np.atleast_1d(np.dot(inertia, body.angular_acceleration))
-        if inertia.ndim:
-            turned = turned + np.cross(w, inertia @ w)
+        turned = inertia @ np.asarray(body.angular_acceleration, float) + np.cross(w, inertia @ w)
         pushed = body.mass * (np.asarray(body.acceleration, float) - np.asarray(gravity, float))
         part = np.concatenate([pushed, turned])
         for load in body.loads:
@@ -181,23 +168,20 @@ def solve(bodies: Mapping[str, Body], joints: Mapping[str, Joint], gravity: Arra
     """
     unknowns, A = left(bodies, joints)
     x = np.linalg.solve(A, right(bodies, joints, gravity))
-    size = len(A) // len(bodies)
-    reaction = {name: np.zeros(size) for name in joints}
+    reaction = {name: np.zeros(6) for name in joints}
     single: dict[str, dict[str, float]] = {"effort": {}, "spin": {}}
     for (name, what, unit), value in zip(unknowns, x, strict=True):
         if what == "reaction":
             reaction[name] += value * unit
         else:
             single[what][name] = float(value)
-    axes = 2 if size == 3 else 3
-    force = {name: wrench[:axes] for name, wrench in reaction.items()}
-    moment = {name: wrench[axes] if axes == 2 else wrench[axes:] for name, wrench in reaction.items()}
+    force, moment = ({name: wrench[part] for name, wrench in reaction.items()} for part in (slice(3), slice(3, 6)))
     return Solution(force, moment, single["effort"], single["spin"])
 
 
 @dataclass(frozen=True)
 class Rubbing:
-    """Friction of one bearing of a joint in space: its size is a function of the reaction, its direction is given.
+    """Friction of one bearing of a joint: its size is a function of the reaction, its direction is given.
 
     size: of (reaction force, moment) on the second body, N; wrench: friction on the second body for size 1, against
     the slip. felt: the reaction it is a function of has the joint's own friction in it.
@@ -223,11 +207,11 @@ def solve_with_friction(
     central differences. Returns friction by joint too. AssertionError if it does not settle, as where the mechanism is
     locked.
     """
-    alone, each = _reactions(bodies, joints, rubbing, gravity)
+    alone, each = loads_of_bearings(bodies, joints, rubbing, gravity)
 
     def law(sizes: Vector) -> Vector:
-        felt = alone + each @ sizes  # (bearing, 6)
-        return np.array([bearing.size(*np.split(load, 2)) for bearing, load in zip(rubbing, felt, strict=True)])
+        loads = alone + each @ sizes  # (bearing, 6)
+        return np.array([bearing.size(*np.split(load, 2)) for bearing, load in zip(rubbing, loads, strict=True)])
 
     n = law(np.zeros(len(rubbing)))
     for _ in range(60):
@@ -245,7 +229,7 @@ def solve_with_friction(
     raise AssertionError("friction does not settle")
 
 
-def _reactions(
+def loads_of_bearings(
     bodies: Mapping[str, Body], joints: Mapping[str, Joint], rubbing: Sequence[Rubbing], gravity: ArrayLike
 ) -> tuple[Vector, Vector]:
     """What a bearing feels without friction (bearing, 6), and to friction of size 1 in each (bearing, 6, bearing)."""

@@ -79,7 +79,7 @@ class Oracle(Linkage):
             free = self.line(motions, link) if link in self.free else None
             inertia = self.inertia(link, motion.frame)
             mass = float(data.get("mass", 0.0))
-            found[link] = Body(mass, inertia, centre, acceleration, motion.spin_rate, motion.spin, loads, free)
+            found[link] = Body(mass, inertia, centre, acceleration, motion.spin, motion.spin_rate, loads, free)
         return found
 
     def load(self, load: Data, motion: Motion) -> Load:

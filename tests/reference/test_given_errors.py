@@ -13,7 +13,7 @@ import trunnion
 from mechanisms import MODELS, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
 from mechanisms_space import Drawn, rssr
-from reference.maximal_space import Array, Data, Drive, Frame, Linkage, Motion, element, point, rotation
+from reference.maximal_space import Array, Data, Drive, Frame, Linkage, Motion, element, point, pose_of, rotation
 from reference.seat_oracle import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.solve.run import prepare
@@ -186,11 +186,8 @@ def test_mechanisms_in_space_with_offsets_in_every_joint(name: str) -> None:
     for link in other.moving:
         if link in other.free:
             continue
-        frame = motions[link].frame
-        axes = np.array([[float(np.ravel(axis[i])[0]) for axis in frame[:3]] for i in range(3)])
-        place = [float(np.ravel(n)[0]) for n in frame.place]
-        np.testing.assert_allclose(axes, frames[link].frame.axes, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(place, frames[link].frame.place, rtol=0, atol=1e-10)
+        for found, expected in zip(pose_of(motions[link].frame), frames[link].frame, strict=True):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
 
 
 def moved_planar(data: Data, seats: dict[str, float], guide: float) -> Data:

@@ -15,6 +15,13 @@ from benchmarks.judged import spatial as judged_spatial
 from benchmarks.judged.verdict import CHECKS, Results
 from benchmarks.random_mechanisms import examine, result_of
 
+import mechanisms_space
+from brief import brief
+from mechanisms import MODELS, Data, model
+from reference.maximal_space import unrolled
+from reference.space_oracle import merged
+from trunnion import Mechanism, Status
+
 STEPS = 24
 # slider-cranks that rub in their guides alone, whose loads cross from one of its ends to the other
 KINKS = (7446, 7517, 7697, 7771, 8097, 8131, 8144)
@@ -51,6 +58,37 @@ def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
     for name, array in quick.arrays.items():
         if name != "locking_margin":
             np.testing.assert_array_equal(array, whole.arrays[name], err_msg=name)
+
+
+def is_right(judge: Any, data: Data, steps: int) -> Any:
+    """The result, of which every solved position keeps every limit."""
+    result = brief(Mechanism(**data), steps)
+    plain = unrolled(data)
+    verdict = judge({**plain, "joints": {name: merged(plain, name) for name in plain["joints"]}}, Results(result))
+    for check, limit in CHECKS.items():
+        assert verdict.worst(check)[0] <= limit, verdict.worst(check)
+    assert np.count_nonzero(result["status"] == Status.SOLVED) > steps - 4
+    return result
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.15])
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "screwed strut"])
+def test_every_mechanism_of_the_tests_is_right(name: str, friction: float) -> None:
+    """Motion by closure and drivers, balance of every link, friction by its law, tooth forces, power."""
+    result = is_right(judged_planar.judge, model(MODELS[name](), friction=friction), STEPS)
+    peak = float(np.abs(result["drive_power"]).max())
+    assert np.abs(result["power_residual"]).max() < 1e-12 * peak
+    assert np.abs(result["closure_residual"]).max() < 1e-13
+    assert float(result["friction_power"].sum("joint").mean()) >= 1e-5 * peak * (friction > 0)
+
+
+@pytest.mark.sample(10)
+@pytest.mark.spread(8, "RSUR-True", "HUSR-True")  # a cross, whose two pins are felt by each other
+@pytest.mark.parametrize("friction", [False, True])
+@pytest.mark.parametrize("name", mechanisms_space.NAMES)
+def test_every_mechanism_in_space_is_right(name: str, friction: bool) -> None:
+    """With all kinds of joints, both models of a bearing's friction, and the pins of a cross, which feel each other."""
+    is_right(judged_spatial.judge, mechanisms_space.with_friction(name, friction), 9)
 
 
 def test_the_judge_sees_a_joint_beside_its_seat() -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-import test_newton_euler as oracle
 
 import trunnion
 from brief import brief
@@ -27,7 +25,9 @@ from mechanisms import (
 )
 from mechanisms_parts import joined
 from mechanisms_space import cardan, rssr
-from reference import newton_euler
+from reference.maximal_space import Drive, in_planes, pose_of
+from reference.newton_euler import loads_of_bearings
+from reference.space_oracle import Oracle
 from trunnion import FrictionMethod, Mechanism, Status, locking
 from trunnion.cycle.locking_course import multiples_at
 from trunnion.results.attributes import summary_of
@@ -103,82 +103,54 @@ def test_successive_approximation_never_calls_a_locked_position_solved() -> None
 
 # ---- homotopy on the oracle -----------------------------------------------------------------------------------
 
-STEPS = oracle.STEPS
+STEPS = 24
 GRID = 120  # steps of the share from 0 to 1
 
 
-def affine(run: Any, data: Data) -> tuple[list[str], Array, Array]:
-    """Joints; reactions (position, joint, xym) without friction; and their change per unit friction of each joint."""
-    time = oracle.times(run)
-    ideal = prepare(run.system.mechanism.with_friction("off"))
-    back, second = ideal.solve(time), oracle.accelerations(run, time)
-    names = list(run.system.joints)
-
-    def reactions(i: int, joints: dict[str, newton_euler.Joint]) -> Array:
-        found = newton_euler.solve(oracle.bodies_at(ideal, data, back, second, i), joints, data["gravity"])
-        return np.array([[*found.force[name], found.moment[name]] for name in names])
-
-    start, slope = [], []
-    for i in range(STEPS):
-        joints = oracle.joints_at(ideal, back, i)
-        zero = reactions(i, joints)
-        start.append(zero)
-        rows = []
-        for name in names:
-            rubbed = replace(joints[name], friction=newton_euler.wrenches(joints[name])[1])
-            rows.append(reactions(i, {**joints, name: rubbed}) - zero)
-        slope.append(rows)
-    return names, np.array(start), np.array(slope)
-
-
-def independent_shares(run: Any, data: Data, coefficient: float, radius: float, guide: float) -> Array:
+def independent_shares(run: Run, data: Data, guide: float) -> Array:
     """Share of the friction, of each position, at which the solution that starts frictionless ends; 1 if none."""
-    names, start, slope = affine(run, data)
-    walk = run.solve(oracle.times(run))
-    kinds = [run.system.joints[name][0] for name in names]
-    sign = np.array([np.broadcast_to(np.sign(walk.walk.speed(name)), (STEPS,)) for name in names]).T
-    lever = np.where(np.array(kinds) == "revolute", radius, 1.0)
-    axes = []
-    for name, (_, (first, _)) in run.system.joints.items():
-        axis = walk.walk.element(first, name)
-        axes.append([np.broadcast_to(n, (STEPS,)) for n in (axis.c, axis.s)])
-    c, s = np.moveaxis(np.array(axes), (0, 1, 2), (2, 0, 1))
+    other, time = Oracle(in_planes(data)), (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
+    walk = run.walk(time)
+    drives = {name: run.system.drive(run.values, name, time) for name in other.drivers}
+    felt = []
+    for i in range(STEPS):
+        home = {link: pose_of(motion.frame, i) for link, motion in walk.motions.items()}
+        drive = {
+            name: Drive(*(float(np.broadcast_to(n, STEPS)[i]) for n in numbers)) for name, numbers in drives.items()
+        }
+        motions = other.move(home, drive)
+        rubbing = [bearing for name in run.system.joints for bearing in other.rubbing(motions, name)]
+        felt.append(loads_of_bearings(other.bodies(motions), other.joints_at(motions, {}), rubbing, other.gravity))
+    start, slope = (np.array(parts) for parts in zip(*felt, strict=True))
+    slides = np.array([kind == "prismatic" for kind, _ in run.system.joints.values()])
+    coefficients = np.array([other.coefficient(name) for name in run.system.joints])
 
-    def normals(phi: Array) -> Array:
-        reaction = start + np.einsum("pl,pljx->pjx", phi, slope)
-        across = c * reaction[..., 1] - s * reaction[..., 0]
-        ends = np.maximum(np.abs(across), 2 * np.abs(reaction[..., 2]) / guide)
-        return np.where(np.array(kinds) == "revolute", np.hypot(reaction[..., 0], reaction[..., 1]), ends)
+    def residual(sizes: Array, share: float) -> Array:
+        load = start + np.einsum("pjwl,pl->pjw", slope, sizes)
+        force, moment = (np.linalg.norm(part, axis=-1) for part in np.split(load, 2, axis=-1))
+        normal = np.where(slides, np.maximum(force, 2 * moment / guide), force)
+        return np.asarray(sizes - share * coefficients * normal)
 
-    def residual(phi: Array, share: Array) -> Array:
-        return phi + share[:, None] * sign * coefficient * lever * normals(phi)
+    def jacobian(sizes: Array, share: float) -> Array:
+        scale = 1e-7 * (np.abs(sizes).max(axis=1, keepdims=True) + 1e-3)
+        steps = scale * np.eye(len(slides))[:, None]  # (friction, position, friction)
+        ends = [(residual(sizes + step, share), residual(sizes - step, share)) for step in steps]
+        return np.stack([(after - before) / (2 * scale) for after, before in ends], axis=-1)
 
-    def jacobian(phi: Array, share: Array) -> Array:
-        scale = 1e-7 * (np.abs(phi).max(axis=1) + 1e-3)
-        columns = []
-        for k in range(len(names)):
-            step = np.zeros_like(phi)
-            step[:, k] = scale
-            columns.append((residual(phi + step, share) - residual(phi - step, share)) / (2 * scale[:, None]))
-        return np.stack(columns, axis=-1)
-
-    phi, alive, reached = np.zeros((STEPS, len(names))), np.ones(STEPS, bool), np.zeros(STEPS)
-    for k in range(1, GRID + 1):
-        share = np.full(STEPS, k / GRID)
-        new = phi.copy()
+    sizes, alive, reached = np.zeros((STEPS, len(slides))), np.ones(STEPS, bool), np.zeros(STEPS)
+    for share in np.arange(1, GRID + 1) / GRID:
+        new = sizes.copy()
         for _ in range(8):
             if np.all((np.abs(residual(new, share)).max(axis=1) < 1e-10 * np.abs(new).max(axis=1))[alive]):
                 break
             matrix = jacobian(new, share)
-            matrix[~alive] = np.eye(len(names))
+            matrix[~alive] = np.eye(len(slides))
             move = np.linalg.solve(matrix, residual(new, share)[..., None])[..., 0]
             new = np.where(alive[:, None], new - move, new)
-        size = np.abs(new).max(axis=1) + 1e-300
-        good = np.abs(residual(new, share)).max(axis=1) < 1e-8 * size
-        good &= np.linalg.det(jacobian(new, share)) > 0
-        alive &= good
-        phi = np.where(alive[:, None], new, phi)
-        reached = np.where(alive, k / GRID, reached)
+        alive &= np.abs(residual(new, share)).max(axis=1) < 1e-8 * (np.abs(new).max(axis=1) + 1e-300)
+        alive &= np.linalg.det(jacobian(new, share)) > 0
+        sizes = np.where(alive[:, None], new, sizes)
+        reached = np.where(alive, share, reached)
         if not alive.any():
             break
     return reached
@@ -204,8 +176,8 @@ def test_locked_positions(name: str) -> None:
     options = {"friction": coefficient, "radius": radius, "guide": guide}
     data = model(MODELS[name](), **options)
     run = prepare(build(MODELS[name](), **options))
-    expected = independent_shares(run, data, coefficient, radius, guide)  # good to one step of the grid
-    back = run.solve(oracle.times(run))
+    expected = independent_shares(run, data, guide)  # good to one step of the grid
+    back = run.solve((np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration)
     found = np.min([np.broadcast_to(settled.share, (STEPS,)) for settled in back.settled], axis=0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=2 / GRID)
     assert np.any(expected < 1), "this case is to have locked positions"

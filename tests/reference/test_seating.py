@@ -16,10 +16,11 @@ from brief import brief
 from mechanisms import four_bar, model, slider_crank
 from mechanisms_parts import body, revolute
 from mechanisms_space import cardan, closed, rssr
-from reference.maximal_space import Array, Data, Drive, Frame, in_planes
+from reference.maximal_space import Array, Data, Drive, in_planes, pose_of
 from reference.seat_oracle import clearance, settle, travelling
 from trunnion.algebra.panels import ON_GRID
 from trunnion.errors import Status
+from trunnion.solve.end_loads import loads_of
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import SETTLED, seating_of
 
@@ -56,15 +57,6 @@ def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
     return found
 
 
-def frame_of(frame: Any) -> Frame:
-    """One pose of Trunnion's, of the plane in space."""
-    if hasattr(frame, "c"):
-        x, y, c, s = (float(np.ravel(n)[0]) for n in frame)
-        return Frame(np.array([x, y, 0.0]), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
-    axes = np.array([[float(np.ravel(axis[i])[0]) for axis in frame[:3]] for i in range(3)])
-    return Frame(np.array([float(np.ravel(n)[0]) for n in frame.place]), axes)
-
-
 def settled_alike(
     data: Data, steps: int, places: Any, limit: float = 2e-6, forces: float = 1e-7, moving: float = np.inf
 ) -> int:
@@ -81,7 +73,7 @@ def settled_alike(
         if result.status.values[i] != Status.SOLVED:
             continue
         back = run.at(result.time.values[i : i + 1], {path: part[i : i + 1] for path, part in offsets.items()})
-        home = {link: frame_of(motion.frame) for link, motion in back.walk.motions.items() if link != "ground"}
+        home = {link: pose_of(motion.frame) for link, motion in back.walk.motions.items() if link != "ground"}
         turned = float(result.joint_rotation.sel(joint=driver).values[i])
         settled = settle(other, home, {driver: Drive(turned, data["drivers"][driver]["speed"])})
         rounds.append(settled.rounds)
@@ -101,6 +93,11 @@ def settled_alike(
         for joint, ends in settled.offsets.items():
             found = np.nan_to_num(result.seat_offset.sel(joint=joint).values[: len(ends), :, i])
             np.testing.assert_allclose(found, ends[:, : found.shape[1]], rtol=0, atol=limit * clearance(other, joint))
+        for seat in run.seats if flat else ():
+            for load, expected in zip(loads_of(back, seat), settled.loads[seat.joint], strict=True):
+                got, across = np.ravel([part[0] for part in load]), expected[:2] if len(load) == 2 else expected[1:2]
+                share = 1e-3 if data["joint_defaults"].get("friction") else 1e-6
+                np.testing.assert_allclose(got, across, rtol=0, atol=share * np.linalg.norm(expected) + 1e-8)
         effort = float(np.ravel(back.efforts[driver])[0])
         assert effort == pytest.approx(settled.solution.effort[driver], abs=forces * size)
     assert len(rounds) >= 5
@@ -181,8 +178,7 @@ def test_reactions_of_a_result_are_those_of_the_whole_motion(name: str) -> None:
         ideal = run.solve(result.time.values).walk.motions
         miss = changed = 0.0
         for i in range(0, 24, 4):
-            home = {link: frame_of(type(motion.frame)(*(np.broadcast_to(n, 24)[i] for n in motion.frame)))
-                    for link, motion in ideal.items() if link != "ground"}  # fmt: skip
+            home = {link: pose_of(motion.frame, i) for link, motion in ideal.items() if link != "ground"}
             turned = float(result.joint_rotation.sel(joint="A").values[i])
             whole = travelling(in_planes(data), home, "A", turned, data["drivers"]["A"]["speed"])
             for joint in data["joints"]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,18 +81,18 @@ def body(rng: np.random.Generator, size: float = 0.4) -> Data:
 TENSOR = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
-def draw(seed: int, joints: Mapping[str, tuple[str, str, str]], drivers: tuple[str, ...] = ("A",)) -> Drawn:
-    """A random mechanism of joints {name: (kind, first link, second link)}, with masses and loads on all links.
+def draw(seed: int, chains: str, drivers: tuple[str, ...] = ("A",)) -> Drawn:
+    """A random mechanism of joints along chains of links, with masses and loads on all links.
 
     A link with two ball joints and no other is a slender rod: its mass is spread evenly along their line. Each is drawn
     once in a run of the tests; everyone gets a copy of its own.
     """
-    return copy.deepcopy(_drawn(seed, tuple(joints.items()), drivers))
+    return copy.deepcopy(_drawn(seed, chains, drivers))
 
 
 @functools.cache
-def _drawn(seed: int, stated: tuple[tuple[str, tuple[str, str, str]], ...], drivers: tuple[str, ...]) -> Drawn:
-    joints = dict(stated)
+def _drawn(seed: int, chains: str, drivers: tuple[str, ...]) -> Drawn:
+    joints = {name: (joint["type"], *joint["links"]) for name, joint in joined(chains).items()}
     rng = np.random.default_rng(seed)
     names = list(dict.fromkeys(link for _, *ends in joints.values() for link in ends if link != "ground"))
     home = {link: frame_of(rng.uniform(-1, 1, 3), random_rotation(rng)) for link in names}
@@ -175,26 +175,19 @@ def started(data: Data, home: dict[str, Frame]) -> Drawn:
 
 
 KINDS = {
-    "R": "revolute",
-    "P": "prismatic",
-    "C": "cylindrical",
-    "S": "spherical",
-    "U": "universal",
-    "H": "helical",
-    "E": "planar",
-    "F": "fixed",
-}
+    "R": "revolute", "P": "prismatic", "C": "cylindrical", "S": "spherical", "U": "universal", "H": "helical",
+    "E": "planar", "F": "fixed",
+}  # fmt: skip
 
 
 def chain(symbols: str, seed: int, drivers: tuple[str, ...] = ("A",)) -> Drawn:
     """A random closed chain: joints A, B, C … of the given symbols, every other one with its links named backwards."""
     links = ["ground", *(f"link-{k}" for k in range(1, len(symbols)))]
-    joints = {}
+    parts = []
     for k, symbol in enumerate(symbols):
-        ends = (links[k], links[(k + 1) % len(symbols)])
-        first, second = ends if k % 2 == 0 else ends[::-1]
-        joints["ABCDEFG"[k]] = (KINDS[symbol], first, second)
-    return draw(seed, joints, drivers)
+        ends = [links[k], links[(k + 1) % len(symbols)]][:: 1 if k % 2 == 0 else -1]
+        parts.append(f" -{'ABCDEFG'[k]}:{KINDS[symbol]}- ".join(ends))
+    return draw(seed, ", ".join(parts), drivers)
 
 
 def rssr(start: float = 0.0, friction: float = 0.0) -> Drawn:
@@ -318,28 +311,16 @@ def closed(data: Data, first: float, seed: int = 0) -> Drawn:
     return Drawn(plain, home)
 
 
-TWO_LOOPS = {
-    "A": ("revolute", "ground", "crank"),
-    "B": ("spherical", "crank", "triangle"),
-    "C": ("universal", "triangle", "rod"),
-    "D": ("cylindrical", "ground", "rod"),
-    "E": ("spherical", "arm", "triangle"),
-    "F": ("cylindrical", "arm", "ground"),
-}
-TWO_RSSR = {
-    "A": ("revolute", "ground", "crank"),
-    "B": ("spherical", "crank", "rod"),
-    "C": ("spherical", "rod", "rocker"),
-    "D": ("revolute", "rocker", "ground"),
-    "E": ("spherical", "rocker", "second-rod"),
-    "F": ("spherical", "output", "second-rod"),
-    "G": ("revolute", "ground", "output"),
-}
-PLATFORM = {
-    "A": ("revolute", "ground", "crank"),
-    **{f"foot-{k}": ("spherical", "crank" if k == 1 else "ground", f"leg-{k}") for k in range(1, 7)},
-    **{f"head-{k}": ("spherical", f"leg-{k}", "platform") for k in range(1, 7)},
-}
+TWO_LOOPS = (
+    "ground -A- crank -B:spherical- triangle -C:universal- rod, ground -D:cylindrical- rod, "
+    "arm -E:spherical- triangle, arm -F:cylindrical- ground"
+)
+TWO_RSSR = (
+    "ground -A- crank -B:spherical- rod -C:spherical- rocker -D- ground, rocker -E:spherical- second-rod, "
+    "output -F:spherical- second-rod, ground -G- output"
+)
+FEET = ", ".join(f"{'crank' if k == 1 else 'ground'} -foot-{k}:spherical- leg-{k}" for k in range(1, 7))
+HEADS = ", ".join(f"leg-{k} -head-{k}:spherical- platform" for k in range(1, 7))
 
 # name: a mechanism; seeds at which the whole range is well conditioned
 MODELS: dict[str, Callable[[], Drawn]] = {
@@ -359,7 +340,7 @@ MODELS: dict[str, Callable[[], Drawn]] = {
     "RRRRRRR": lambda: chain("RRRRRRR", 23),
     "two loops in one group": lambda: draw(21, TWO_LOOPS),
     "two RSSR in series": lambda: draw(14, TWO_RSSR),
-    "platform on six legs": lambda: draw(3, PLATFORM),
+    "platform on six legs": lambda: draw(3, f"ground -A- crank, {FEET}, {HEADS}"),
 }
 
 

@@ -24,8 +24,7 @@ COORDINATES = {"S": "m", "K": "rad"}
 def mixed(space: str) -> Mechanism:
     """A cylinder S and a motor K, each with a driver."""
     if space == "spatial":
-        joints = {"S": ("prismatic", "ground", "slide"), "K": ("revolute", "slide", "hand")}
-        return Mechanism(**draw(3, joints, ("S", "K")).data)
+        return Mechanism(**draw(3, "ground =S= slide -K- hand", ("S", "K")).data)
     data = excavator()
     data["joints"]["C"]["pin"] = {"radius": 0.01, "clearance": 1e-4, "length": 0.03}
     data["springs"] = {

@@ -11,7 +11,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,8 @@ import numpy as np
 from ezdxf import recover
 from ezdxf.lldxf.const import DXFError
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, free_name
+from trunnion.errors import MechanismError
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
 from trunnion.exchange.drawing import AUXILIARY
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at,
 # what the library lets through of damaged files; a generator that ends too early is a RuntimeError or a StopIteration
 SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, StopIteration,
           TypeError, ValueError)  # fmt: skip
+Text = tuple[str, Array, str]  # layer, place and words
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,20 +76,10 @@ class Slot(Line):
         along, aside = off @ self.span / self.length, abs(_cross(self.span, off)) / self.length
         return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
 
-
-@dataclass
-class Sketch:
-    """What of a drawing may be part of a mechanism, m: circles and points (radius 0), lines, half circles, texts.
-
-    left: how many entities of each kind are not read; heights: along z.
-    """
-
-    circles: list[tuple[str, Array, float]] = field(default_factory=list)
-    lines: list[Line] = field(default_factory=list)
-    halves: list[Slot] = field(default_factory=list)
-    texts: list[tuple[str, Array, str]] = field(default_factory=list)
-    left: Counter[str] = field(default_factory=Counter)
-    heights: list[float] = field(default_factory=list)
+    def completes(self, other: Slot) -> bool:
+        """Whether two half circles run between the same ends, the other way."""
+        apart = np.linalg.norm(self.start - other.end) + np.linalg.norm(self.end - other.start)
+        return bool(apart < HALF * other.half and abs(self.half - other.half) < HALF * other.half)
 
 
 def read(path: Path, options: ImportOptions) -> Draft:
@@ -108,165 +99,130 @@ def read(path: Path, options: ImportOptions) -> Draft:
     MechanismError : if the file cannot be read or holds no mechanism.
     """
     draft = Draft(plane=True)
+    few(len(re.findall(rb"\n *0\r?\n[A-Z]|\x00[A-Z][A-Z0-9_]{2,}\x00", path.read_bytes())), MOST_OBJECTS, "objects")
     try:
-        document = _document(path, draft)
-        sketch = _gathered(document, _unit(document, options, draft))
-    except SPOILT as error:
-        if isinstance(error, MechanismError):
-            raise
-        raise MechanismError(Finding("is no DXF, or too damaged to be read", file=str(path))) from None
-    count = len(sketch.circles) + len(sketch.lines) + len(sketch.halves) + len(sketch.texts)
-    places = np.array(
-        [place for _, place, _ in sketch.circles] + [end for line in sketch.lines for end in (line.start, line.end)]
-    )
-    what = "" if len(places) else "holds no circle, point or line"
-    if count > MOST_MARKS:
-        what = f"holds {count:,} lines, circles and texts; a skeleton has at most {MOST_MARKS:,}"
-    elif not np.abs(places).max(initial=0.0) < FARTHEST:
-        what = f"holds coordinates that are no numbers or beyond {FARTHEST:g} m"
-    if what:
+        document, auditor = recover.readfile(path)
+        if auditor.has_errors or auditor.has_fixes:
+            mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
+            what = f"is damaged; what could be mended is read: {mended}"
+            draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
+        sketch = Sketch(document, UNITS.get(document.header.get("$INSUNITS", 0)) or draft.assumed_unit(options))
+    except MechanismError:
+        raise
+    except SPOILT:
+        raise refused("is no DXF, or too damaged to be read") from None
+    marks = (*sketch.circles, *sketch.lines, *sketch.halves, *sketch.texts)
+    few(len(marks), MOST_MARKS, "lines, circles and texts")
+    places = [place for _, place, _ in sketch.circles]
+    places += [end for line in sketch.lines for end in (line.start, line.end)]
+    if not places or not np.abs(places).max() < FARTHEST:
+        what = f"holds no circle, point or line, or coordinates that are no numbers or beyond {FARTHEST:g} m"
         what = f"is damaged, and {what}" if any(f.code == "exchange.damaged" for f in draft.findings) else what
-        remedy = "draw each link on a layer of its own: its pins as circles, lines between them"
-        raise MechanismError(Finding(what, file=str(path), remedy=remedy))
-    for kind, count in sketch.left.most_common(6):
-        draft.lose(f"{count} {kind}")
+        raise refused(what, remedy="draw each link on a layer of its own: its pins as circles, lines between them")
+    for kind, number in sketch.left.most_common(6):
+        draft.lose(f"{number} {kind}")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
-        draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
+        draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z")
     _Reader(sketch, draft, options, size).read()
     draft.note("exchange.mass", "file", "a DXF holds no masses", "add mass, centre and inertia to the links")
     return draft
 
 
-def _document(path: Path, draft: Draft) -> Drawing:
-    """The drawing, mended if it is damaged; MechanismError if it holds too much."""
-    objects = len(re.findall(rb"\n *0\r?\n[A-Z]|\x00[A-Z][A-Z0-9_]{2,}\x00", path.read_bytes()))
-    if objects > MOST_OBJECTS:
-        what = f"holds some {objects:,} objects; at most {MOST_OBJECTS:,} are read"
-        raise MechanismError(Finding(what, file=str(path), remedy="export the skeleton alone"))
-    document, auditor = recover.readfile(path)
-    if auditor.has_errors or auditor.has_fixes:
-        mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
-        what = f"is damaged; what could be mended is read: {mended}"
-        draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
-    return document
-
-
-def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
-    """The length unit of the drawing, m."""
-    unit = UNITS.get(document.header.get("$INSUNITS", 0))
-    if unit is not None:
-        return unit
-    what = f"states no unit; {1e3 * options.unit:g} mm is taken for 1"
-    if not options.unit_stated:
-        draft.warn("exchange.unit", "file", what, "state it with --unit")
-    return options.unit
-
-
 # ---- what is drawn ------------------------------------------------------------------------------------------------
 
 
-def _gathered(document: Drawing, unit: float) -> Sketch:
-    """The marks on the layers that are switched on."""
-    sketch = Sketch()
-    hidden = {entry.dxf.name.casefold() for entry in document.layers if entry.is_off() or entry.is_frozen()}
-    names: dict[str, str] = {}
-    for layer, entity in _entities(document.modelspace(), "", 0, [0]):
-        key = layer.casefold()
-        if key.startswith(SKIPPED):
-            continue
-        if key in hidden:
-            sketch.left[f"entity on the hidden layer {layer}"] += 1
-            continue
-        if entity.dxftype() in ("LINE", "ARC") and _is_centre_line(document, layer, entity):
-            sketch.left["centre line"] += 1
-            continue
-        if key not in names:
-            names[key] = free_name(layer, names.values())
-        _gather(sketch, names[key], entity, unit)
-    _close_circles(sketch)
-    return sketch
+class Sketch:
+    """What of a drawing may be part of a mechanism, m: circles and points (radius 0), lines, half circles, texts.
 
-
-def _is_centre_line(document: Drawing, layer: str, entity: Any) -> bool:
-    """Whether a line is chain dotted, by itself or by its layer, as centre lines and axes are."""
-    linetype = entity.dxf.get("linetype", "BYLAYER").upper()
-    if linetype == "BYLAYER":
-        linetype = document.layers.get(layer).dxf.linetype.upper() if layer in document.layers else ""
-    return linetype.startswith(CHAINED) or any(word in layer.casefold() for word in CENTRES)
-
-
-def _close_circles(sketch: Sketch) -> None:
-    """Make two half arcs about one centre, which is how some programs draw a circle, a circle."""
-    halves: list[Slot] = []
-    for slot in sketch.halves:
-        other = next((halve for halve in halves if halve.layer == slot.layer and _completes(halve, slot)), None)
-        if other is None:
-            halves.append(slot)
-        else:
-            halves.remove(other)
-            sketch.circles.append((slot.layer, (slot.start + slot.end) / 2, slot.half))
-    sketch.halves = halves
-
-
-def _completes(slot: Slot, other: Slot) -> bool:
-    """Whether two half circles run between the same ends, the other way."""
-    apart = np.linalg.norm(slot.start - other.end) + np.linalg.norm(slot.end - other.start)
-    return bool(apart < HALF * other.half and abs(slot.half - other.half) < HALF * other.half)
-
-
-def _entities(entities: Iterable[Any], inserted: str, depth: int, count: list[int]) -> Iterator[tuple[str, Any]]:
-    """Lines, arcs, circles, points and texts with their layers, blocks and polylines taken apart.
-
-    inserted: the layer on which the block lies; it is that of what lies on layer 0 in the block.
+    left: how many entities of each kind are not read; heights: along z.
     """
-    for entity in entities:
-        count[0] += 1
-        if count[0] > MOST_PARTS or depth > DEEPEST:
-            what = f"holds blocks of over {MOST_PARTS:,} parts, or {DEEPEST} deep"
-            raise MechanismError(Finding(what, "file", "export the skeleton alone"))
-        layer = entity.dxf.get("layer", "0")
-        layer = inserted if inserted and layer == "0" else layer
-        kind = entity.dxftype()
-        if kind == "INSERT":
-            for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
-                count[0] += 1
-                yield from _entities(single.virtual_entities(), layer, depth + 1, count)
-                yield from ((layer, attribute) for attribute in single.attribs)
-        elif kind in ("LWPOLYLINE", "POLYLINE"):
-            for part in entity.virtual_entities():
-                count[0] += 1
-                yield layer, part
+
+    def __init__(self, document: Drawing, unit: float) -> None:
+        self.unit, self.count = unit, 0
+        self.circles: list[tuple[str, Array, float]] = []
+        self.lines: list[Line] = []
+        self.halves: list[Slot] = []
+        self.texts: list[Text] = []
+        self.left: Counter[str] = Counter()
+        self.heights: list[float] = []
+        hidden = {entry.dxf.name.casefold() for entry in document.layers if entry.is_off() or entry.is_frozen()}
+        names: dict[str, str] = {}
+        for layer, entity in self._entities(document.modelspace(), "", 0):
+            key, linetype = layer.casefold(), entity.dxf.get("linetype", "BYLAYER").upper()
+            if linetype == "BYLAYER":
+                linetype = document.layers.get(layer).dxf.linetype.upper() if layer in document.layers else ""
+            chained = linetype.startswith(CHAINED) or any(word in key for word in CENTRES)
+            if key in hidden and not key.startswith(SKIPPED):
+                self.left[f"entity on the hidden layer {layer}"] += 1
+            elif chained and entity.dxftype() in ("LINE", "ARC") and not key.startswith(SKIPPED):
+                self.left["centre line"] += 1
+            elif not key.startswith(SKIPPED):
+                if key not in names:
+                    names[key] = free_name(layer, names.values())
+                self._add(names[key], entity)
+        halves, self.halves = self.halves, []
+        for slot in halves:  # two half arcs about one centre, which is how some programs draw a circle, are a circle
+            other = next((half for half in self.halves if half.layer == slot.layer and half.completes(slot)), None)
+            if other is None:
+                self.halves.append(slot)
+            else:
+                self.halves.remove(other)
+                self.circles.append((slot.layer, (slot.start + slot.end) / 2, slot.half))
+
+    def _entities(self, entities: Iterable[Any], inserted: str, depth: int) -> Iterator[tuple[str, Any]]:
+        """Lines, arcs, circles, points and texts with their layers, blocks and polylines taken apart.
+
+        inserted: the layer on which the block lies; it is that of what lies on layer 0 in the block.
+        """
+        for entity in entities:
+            self.count += 1
+            few(self.count, MOST_PARTS, "parts of blocks")
+            few(depth, DEEPEST, "blocks in one another")
+            layer = entity.dxf.get("layer", "0")
+            layer = inserted if inserted and layer == "0" else layer
+            kind = entity.dxftype()
+            if kind == "INSERT":
+                for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                    self.count += 1
+                    yield from self._entities(single.virtual_entities(), layer, depth + 1)
+                    yield from ((layer, attribute) for attribute in single.attribs)
+            elif kind in ("LWPOLYLINE", "POLYLINE"):
+                for part in entity.virtual_entities():
+                    self.count += 1
+                    yield layer, part
+            else:
+                yield layer, entity
+
+    def _add(self, layer: str, entity: Any) -> None:
+        """Add an entity, in m."""
+        kind, dxf = entity.dxftype(), entity.dxf
+
+        def place(point: Any) -> Array:
+            self.heights.append(self.unit * point.z)
+            return self.unit * np.array([point.x, point.y])
+
+        if kind in ("CIRCLE", "ARC", "ELLIPSE") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
+            kind = f"tilted {kind}"
+        sweep = dxf.end_angle - dxf.start_angle if kind == "ARC" else 0.0
+        if kind == "LINE":
+            self.lines.append(Line(layer, place(dxf.start), place(dxf.end)))
+        elif kind == "CIRCLE" or (kind == "ARC" and abs(sweep) >= 360 - math.degrees(HALF)):
+            self.circles.append((layer, place(entity.ocs().to_wcs(dxf.center)), abs(self.unit * dxf.radius)))
+        elif kind == "POINT":
+            self.circles.append((layer, place(dxf.location), 0.0))
+        elif kind == "ARC" and abs(sweep % 360 - 180) < math.degrees(HALF):
+            self.halves.append(Slot(layer, place(entity.start_point), place(entity.end_point), self.unit * dxf.radius))
+        elif (
+            kind == "ELLIPSE" and abs(dxf.ratio - 1) < TOUCH and abs(dxf.end_param - dxf.start_param - math.tau) < HALF
+        ):
+            self.circles.append((layer, place(dxf.center), self.unit * dxf.major_axis.magnitude))  # of a scaled block
+        elif kind in ("TEXT", "ATTRIB"):
+            self.texts.append((layer, place(entity.get_placement()[1]), entity.plain_text()))
+        elif kind == "MTEXT" and "\n" not in entity.plain_text().strip():
+            self.texts.append((layer, place(dxf.insert), entity.plain_text()))
         else:
-            yield layer, entity
-
-
-def _gather(sketch: Sketch, layer: str, entity: Any, unit: float) -> None:
-    """Add an entity to a sketch, in m."""
-    kind, dxf = entity.dxftype(), entity.dxf
-
-    def place(point: Any) -> Array:
-        sketch.heights.append(unit * point.z)
-        return unit * np.array([point.x, point.y])
-
-    if kind in ("CIRCLE", "ARC", "ELLIPSE") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
-        kind = f"tilted {kind}"
-    if kind == "LINE":
-        sketch.lines.append(Line(layer, place(dxf.start), place(dxf.end)))
-    elif kind == "CIRCLE" or (kind == "ARC" and abs(dxf.end_angle - dxf.start_angle) >= 360 - math.degrees(HALF)):
-        sketch.circles.append((layer, place(entity.ocs().to_wcs(dxf.center)), abs(unit * dxf.radius)))
-    elif kind == "POINT":
-        sketch.circles.append((layer, place(dxf.location), 0.0))
-    elif kind == "ARC" and abs((dxf.end_angle - dxf.start_angle) % 360 - 180) < math.degrees(HALF):
-        sketch.halves.append(Slot(layer, place(entity.start_point), place(entity.end_point), unit * dxf.radius))
-    elif kind == "ELLIPSE" and abs(dxf.ratio - 1) < TOUCH and abs(dxf.end_param - dxf.start_param - math.tau) < HALF:
-        sketch.circles.append((layer, place(dxf.center), unit * dxf.major_axis.magnitude))  # of a scaled block
-    elif kind in ("TEXT", "ATTRIB"):
-        sketch.texts.append((layer, place(entity.get_placement()[1]), entity.plain_text()))
-    elif kind == "MTEXT" and "\n" not in entity.plain_text().strip():
-        sketch.texts.append((layer, place(dxf.insert), entity.plain_text()))
-    else:
-        sketch.left[kind] += 1
+            self.left[kind] += 1
 
 
 # ---- what it means ------------------------------------------------------------------------------------------------
@@ -285,7 +241,15 @@ class _Reader:
         self.joined: set[int] = set()
         self.marks: dict[int, dict[str, list[float]]] = {}
         layers = list(dict.fromkeys([*(layer for layer, *_ in sketch.circles), *(line.layer for line in sketch.lines)]))
-        draft.ground = self._ground(layers, options.ground)
+        named = [layer for layer in layers if any(word in layer.casefold() for word in GROUNDS)]
+        named += [layer for layer in layers if layer == "0"]
+        if options.ground or not named:
+            draft.ground = options.ground if options.ground in layers else ""
+        else:
+            draft.ground = named[0]
+            if len(named) > 1:
+                what = f"is taken as what does not move, and {', '.join(named[1:])} as links that may"
+                draft.warn("exchange.ground", f"links.{named[0]}", what, "draw it on one layer, or state --ground")
         draft.bodies = {layer: Body(layer) for layer in sorted(layers, key=lambda layer: layer != draft.ground)}
         for layer, place, radius in sketch.circles:
             self.marks.setdefault(self._place(place), {}).setdefault(layer, []).append(radius)
@@ -302,18 +266,6 @@ class _Reader:
         if not len(near):
             self.places = np.vstack([self.places, point])
         return int(near[0]) if len(near) else len(self.places) - 1
-
-    def _ground(self, layers: list[str], option: str) -> str:
-        """The layer that does not move: that which is stated, or has such a name, or layer 0; empty if none."""
-        draft = self.draft
-        named = [layer for layer in layers if any(word in layer.casefold() for word in GROUNDS)]
-        named += [layer for layer in layers if layer == "0"]
-        if option or not named:
-            return option if option in layers else ""
-        if len(named) > 1:
-            what = f"is taken as what does not move, and {', '.join(named[1:])} as links that may"
-            draft.warn("exchange.ground", f"links.{named[0]}", what, "draw all of it on one layer, or state --ground")
-        return named[0]
 
     def read(self) -> None:
         """Pins, guides, points and names, in this order; what no joint holds is left out."""
@@ -479,37 +431,35 @@ class _Reader:
         A name on the layer of a link that moves makes it the second link of the joint.
         """
         draft, near = self.draft, NEAR * self.size
-        targets: list[tuple[str, str, tuple[str, ...], Array]] = []  # layer of a point, old name, links, place
-        targets += [("", pair.name, pair.links, pair.at) for pair in draft.pairs.values()]
+        targets = [("", pair.name, pair.links, pair.at) for pair in draft.pairs.values()]  # layer of a point, old name
         for link, body in draft.bodies.items():
-            targets += [(link, name, (link,), at) for name, at in body.points.items()]
+            targets += [(link, name, (link, link), at) for name, at in body.points.items()]
             body.points = {}
-        choices = []
+        choices, texts = list[tuple[float, int, int, Text]](), dict[int, Text]()
         places = np.array([at[:2] for *_, at in targets]).reshape(-1, 2)
-        for i, (layer, place, _) in enumerate(self.sketch.texts):
-            apart = np.hypot(*(places - place).T)
+        for text in self.sketch.texts:
+            apart = np.hypot(*(places - text[1]).T)
             for j in (int(j) for j in np.argsort(apart, kind="stable")[:CROWD] if apart[j] <= near):
                 links = targets[j][2]
-                strange = 0.0 if layer == links[-1] else 0.5 if layer in links else 1.0
-                choices.append((float(apart[j]) + near * strange, j, i))
-        texts: dict[int, int] = {}
-        for _, j, i in sorted(choices):
-            if j not in texts and i not in texts.values():
-                texts[j] = i
+                strange = 0.0 if text[0] == links[-1] else 0.5 if text[0] in links else 1.0
+                choices.append((float(apart[j]) + near * strange, j, len(choices), text))
+        for _, j, _, text in sorted(choices, key=lambda choice: choice[:3]):
+            if j not in texts and not any(text is other for other in texts.values()):
+                texts[j] = text
         used: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
         pairs, draft.pairs = draft.pairs, {}
         renamed: dict[str, str] = {}
         for j in sorted(range(len(targets)), key=lambda j: (targets[j][0] != "", j not in texts)):
             link, old, links, at = targets[j]
-            layer, _, text = self.sketch.texts[texts[j]] if j in texts else ("", at, old)
-            name = free_name(text.strip(), [*used[""], *used[link]])
+            layer, _, label = texts.get(j, ("", at, old))
+            name = free_name(label.strip(), [*used[""], *used[link]])
             used[link].append(name)
             if link:
                 draft.bodies[link].points[name] = at
-                continue
-            turned = layer == links[0] != draft.ground
-            draft.pairs[name] = replace(pairs[old], name=name, links=(links[turned], links[not turned]))
-            renamed[f"joints.{old}"] = f"joints.{name}"
+            else:
+                turned = layer == links[0] != draft.ground
+                draft.pairs[name] = replace(pairs[old], name=name, links=(links[turned], links[not turned]))
+                renamed[f"joints.{old}"] = f"joints.{name}"
         draft.findings = [replace(note, where=renamed.get(note.where, note.where)) for note in draft.findings]
 
 
@@ -527,9 +477,7 @@ def _lying(lines: list[Line], gap: float) -> Iterator[tuple[Line, Line]]:
         for j in np.flatnonzero(lies & (overlap > 0.01 * np.minimum(lengths[i + 1 :], line.length))):
             if lines[i + 1 + j].layer != line.layer:
                 count += 1
-                if count > 5 * MOST_MARKS:
-                    what = f"holds more than {5 * MOST_MARKS:,} lines that lie on lines of other layers"
-                    raise MechanismError(Finding(what, "file", "export the skeleton alone"))
+                few(count, 5 * MOST_MARKS, "lines that lie on lines of other layers")
                 yield line, lines[i + 1 + j]
 
 

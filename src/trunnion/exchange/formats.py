@@ -1,7 +1,7 @@
-"""The table of file formats: by extension, what reads and what writes them, and the module that does it.
+"""The table of file formats: by extension, what reads and what writes them.
 
-A new format is a module with `read(path, options)`, which returns a Draft, or `write(positions, path)`, and
-an entry here. One with `write_moved(positions, path, original)` also moves the parts of the file that a model is of.
+A new format is a function `read(path, options)`, which returns a Draft, or `write(positions, path)`, which returns the
+findings of what it cannot hold, and an entry here.
 """
 
 from __future__ import annotations
@@ -35,51 +35,73 @@ LARGEST = 200_000_000  # bytes of a file that is read
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: its name, and the modules in `exchange` that read and write it; empty if none does."""
+    """A file format.
+
+    Parameters
+    ----------
+    name : of the format.
+    reads, writes : module in `exchange` and function that read and write it; empty if none does.
+    moves : whether it takes the whole cycle, not a position. magnifies : whether it is looked at, not computed with.
+    parts : module and function that write the parts of a file that a model is of, where they are then.
+    """
 
     name: str
     reads: str = ""
     writes: str = ""
+    moves: bool = False
+    magnifies: bool = False
+    parts: str = ""
 
 
+STEP = Format("STEP", "step.read", "step.write", magnifies=True, parts="step.write_moved")
+PMKS = Format("PMKS+", "linkages.read")
+MESH = "mesh.read"
 FORMATS: dict[str, Format] = {
-    ".mjcf": Format("MJCF", "mjcf", "mjcf"),
-    ".sdf": Format("SDF", "sdf", "sdf"),
-    ".urdf": Format("URDF", "urdf", "urdf"),
-    ".step": Format("STEP", "step", "step"),
-    ".stp": Format("STEP", "step", "step"),
-    ".dxf": Format("DXF", "dxf", "drawing"),
-    ".stl": Format("STL", "mesh"),
-    ".3mf": Format("3MF", "mesh"),
-    ".glb": Format("glTF", "mesh", "glb"),
-    ".fcstd": Format("FreeCAD", "freecad"),
-    ".pmks": Format("PMKS+", "linkages"),
-    ".url": Format("PMKS+", "linkages"),
-    ".txt": Format("PMKS+", "linkages"),
-    ".json": Format("pylinkage", "linkages"),
-    ".fmu": Format("FMU", writes="fmu"),
+    ".mjcf": Format("MJCF", "mjcf.read", "mjcf.write"),
+    ".sdf": Format("SDF", "sdf.read", "sdf.write"),
+    ".urdf": Format("URDF", "sdf.read_urdf", "sdf.write_urdf"),
+    ".step": STEP,
+    ".stp": STEP,
+    ".dxf": Format("DXF", "dxf.read", "drawing.write"),
+    ".stl": Format("STL", MESH),
+    ".3mf": Format("3MF", MESH),
+    ".glb": Format("glTF", MESH, "mesh.write", moves=True, magnifies=True),
+    ".fcstd": Format("FreeCAD", "freecad.read"),
+    ".pmks": PMKS,
+    ".url": PMKS,
+    ".txt": PMKS,
+    ".json": Format("pylinkage", "linkages.read"),
+    ".fmu": Format("FMU", writes="fmu.write"),
 }
 
 
-def _entry(path: Path, verb: str) -> tuple[Format, Any]:
-    """The format of a file by its extension, `.xml` by its first element, and the module that reads or writes it."""
+def _entry(path: Path, verb: str) -> Format:
+    """The format of a file by its extension, `.xml` by its first element, which it must have; verb: reads or writes."""
     suffix = path.suffix.lower()
     if suffix == ".xml":
         text = path.read_bytes()[:65536] if verb == "reads" else b""
         roots = {b"<robot": ".urdf", b"<sdf": ".sdf"}
         suffix = next((ending for root, ending in roots.items() if root in text and b"<mujoco" not in text), ".mjcf")
-    entry = FORMATS.get(suffix)
-    if entry is None or not getattr(entry, verb):
-        what = f"has the extension {path.suffix or '(none)'!r}, which is not {'read' if verb == 'reads' else 'written'}"
-        possible = ", ".join(ending for ending, kind in FORMATS.items() if getattr(kind, verb))
-        raise MechanismError(Finding(f"{what} here", file=str(path), remedy=f"use one of {possible}"))
+    if suffix in FORMATS and getattr(FORMATS[suffix], verb):
+        return FORMATS[suffix]
+    possible = ", ".join(ending for ending, kind in FORMATS.items() if getattr(kind, verb))
+    what = (
+        f"has the extension {path.suffix or '(none)'!r}, which is not {'read' if verb == 'reads' else 'written'} here"
+    )
+    raise MechanismError(Finding(what, file=str(path), remedy=f"use one of {possible}"))
+
+
+def _call(place: str, *arguments: Any) -> Any:
+    """What a function of a format gives; MechanismError that names the extra if a library of it is missing."""
+    module, _, function = place.partition(".")
     try:
-        return entry, import_module(f"trunnion.exchange.{getattr(entry, verb)}")
+        loaded = import_module(f"trunnion.exchange.{module}")
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("trunnion"):
             raise
-        what = f"{entry.name} needs {error.name}, which is not installed"
-        raise MechanismError(Finding(what, file=str(path), remedy="pip install 'trunnion[cad]'")) from None
+        what = f"this format needs {error.name}, which is not installed"
+        raise MechanismError(Finding(what, "file", "pip install 'trunnion[cad]'")) from None
+    return getattr(loaded, function)(*arguments)
 
 
 def import_file(
@@ -127,15 +149,15 @@ def import_file(
             rate, turns = _number(speed, "speed", "speed"), False
     try:
         if str(path).startswith(LINKS):
-            draft: Draft = import_module("trunnion.exchange.linkages").read_link(str(path))
+            draft: Draft = _call("linkages.read_link", str(path))
         else:
             reading(path)
-            _, module = _entry(path, "reads")
+            entry = _entry(path, "reads")
             size = path.stat().st_size
             if not size:
                 raise refused("is empty")
             few(size, LARGEST, "bytes")
-            draft = module.read(path, options)
+            draft = _call(entry.reads, path, options)
     except MechanismError as error:
         raise MechanismError([replace(finding, file=finding.file or str(path)) for finding in error.findings]) from None
     except OSError as error:
@@ -193,16 +215,15 @@ def export_model(
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
     path = Path(path)
-    entry, module = _entry(path, "writes")
-    if magnify != 1 and not getattr(module, "MAGNIFIES", False):
+    entry = _entry(path, "writes")
+    if magnify != 1 and not entry.magnifies:
         what = f"a model in {entry.name} has the mechanism's own places; they are not magnified"
         raise MechanismError(Finding(what, "--magnify", "leave it out, or write .step or .glb"))
     if not np.isfinite(magnify):
         raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
-    moves = getattr(module, "MOVES", False)
-    positions = positions_of(mechanism, *((frames, None) if moves else (FEWEST, at)), magnify=magnify)
+    positions = positions_of(mechanism, *((frames, None) if entry.moves else (FEWEST, at)), magnify=magnify)
     if original is not None:
-        if not hasattr(module, "write_moved"):
+        if not entry.parts:
             raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
         reading(original)
         try:
@@ -211,7 +232,7 @@ def export_model(
             raise MechanismError(Finding(f"cannot be read: {error.strerror}", file=str(original))) from None
     with whole(path) as temporary:
         if original is None:
-            findings: list[Finding] = module.write(positions, temporary)
+            findings: list[Finding] = _call(entry.writes, positions, temporary)
         else:
-            findings = module.write_moved(positions, temporary, Path(original))
+            findings = _call(entry.parts, positions, temporary, Path(original))
     return findings

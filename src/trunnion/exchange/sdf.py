@@ -1,7 +1,11 @@
-"""SDF, the files of Gazebo: read with its frames, and written with every loop as it is, since joints may close them."""
+"""SDF, the files of Gazebo, and URDF, the trees of ROS, which is read as the SDF that Gazebo makes of it.
+
+Both are written with every loop: joints of SDF may close them, in URDF those under `<gazebo>`.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -11,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from trunnion.errors import Finding
 from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, ImportOptions, Pair, Place, refused
 from trunnion.exchange.robots import (
+    APART,
     WORLD,
     Scene,
     laid_out,
@@ -24,7 +29,7 @@ from trunnion.exchange.robots import (
 )  # fmt: skip
 from trunnion.exchange.skeleton import Positions
 
-__all__ = ["Reader", "add_driver", "add_joint", "end_of", "read", "write"]
+__all__ = ["read", "read_urdf", "write", "write_urdf"]
 
 TYPES = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "ball": "spherical",
          "universal": "universal", "revolute2": "universal", "screw": "helical", "fixed": "fixed",
@@ -34,6 +39,8 @@ UNLIMITED = 1e3  # rad or m, from which a limit is none
 SPECK = Body("", 1e-9, inertia=1e-15 * np.eye(3))  # holds two joints: Gazebo refuses bodies without mass
 CONTROLLER = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::systems::JointController"}
 YES = ("1", "true")
+MOST = {"effort": "1e6", "velocity": "1e3"}  # N m or N, rad/s or m/s: limits that a joint must state and never meets
+FAR = 1e3  # m, limit of a slide without one
 
 
 def read(path: Path, options: ImportOptions) -> Draft:
@@ -43,7 +50,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     models = (root if world is None else world).findall("model")
     if not models:
         raise refused("has no model", remedy="export a model")
-    reader = Reader(models[0].get("name", ""), root.get("version", "1.6"))
+    reader = _Reader(models[0].get("name", ""), root.get("version", "1.6"))
     draft = reader.draft
     if world is not None:
         gravity = numbers(world.findtext("gravity"), "gravity", 3, (0, 0, -9.8))
@@ -56,7 +63,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     return reader.settled(WORLD, options.ground)
 
 
-class Reader(Scene):
+class _Reader(Scene):
     """The links, joints and frames of the models of a file, by names with the scope of nested models."""
 
     def __init__(self, name: str, version: str) -> None:
@@ -82,7 +89,7 @@ class Reader(Scene):
                 self._place(part, name, self.attached[name], prefix)
             elif part.tag == "joint":
                 self.joints.append((part, prefix))
-                child = end_of(part, "child")
+                child = _end_of(part, "child")
                 self._place(part, f"joint {name}", child if child == WORLD else prefix + child, prefix)
             elif part.tag == "model":
                 self.add_model(part, f"{name}::", base)
@@ -144,7 +151,7 @@ class Reader(Scene):
     def add_joints(self) -> None:
         """Make pairs of the joints that were collected, and points of the frames."""
         bodies = self.draft.bodies
-        ends = {end_of(part, tag) for part, _ in self.joints for tag in ("parent", "child")}
+        ends = {_end_of(part, tag) for part, _ in self.joints for tag in ("parent", "child")}
         if WORLD in ends or self.draft.pairs:
             bodies.setdefault(WORLD, Body(WORLD))
         for part, prefix in self.joints:
@@ -175,7 +182,7 @@ class Reader(Scene):
         if kind not in TYPES:
             raise refused(f"has the type {kind!r}, which is not read", where, f"use {', '.join([*TYPES][:-1])}")
         for tag in ("parent", "child"):
-            end = end_of(part, tag)
+            end = _end_of(part, tag)
             ends.append(WORLD if end == WORLD else self._link(prefix + end))
             if not ends[-1]:
                 raise refused(f"joins {end!r}, which is no link of the file", where)
@@ -219,7 +226,7 @@ class Reader(Scene):
         return name if name in self.draft.bodies else ""
 
 
-def end_of(part: Element, tag: str) -> str:
+def _end_of(part: Element, tag: str) -> str:
     """The name of the parent or child of a joint."""
     end = part.find(tag)
     name = "" if end is None else (end.text or end.get("link") or "").strip()
@@ -255,7 +262,7 @@ def write(positions: Positions, path: Path) -> list[Finding]:
     _leaf(world, "gravity", np.zeros(3) if draft.gravity is None else draft.gravity)
     model = SubElement(world, "model", name=draft.name or "mechanism")
     origins, inner, closing, rates = laid_out(draft, ("cylindrical", "planar"))
-    add_joint(model, Pair("world", "fixed", (WORLD, draft.ground), np.zeros(3)), origins)
+    _add_joint(model, Pair("world", "fixed", (WORLD, draft.ground), np.zeros(3)), origins)
     for name, origin in origins.items():
         link = SubElement(model, "link", name=name)
         _leaf_pose(link, origin)
@@ -269,14 +276,14 @@ def write(positions: Positions, path: Path) -> list[Finding]:
         for point, place in body.points.items():
             _leaf_pose(SubElement(model, "frame", name=f"{name}.{point}", attached_to=name), place - origin)
     for pair in [*inner, *closing]:
-        add_joint(model, pair, origins)
+        _add_joint(model, pair, origins)
     for name, rate in rates.items():
-        add_driver(model, name, rate)
+        _add_driver(model, name, rate)
     written(root, path)
     return draft.findings
 
 
-def add_joint(model: Element, pair: Pair, origins: dict[str, Array]) -> None:
+def _add_joint(model: Element, pair: Pair, origins: dict[str, Array]) -> None:
     """Write a pair as a joint between two links, whose origins are given."""
     joint = SubElement(model, "joint", name=pair.name, type=NAMES.get(pair.type, pair.type))
     offset = pair.at - origins[pair.links[1]]
@@ -297,7 +304,7 @@ def add_joint(model: Element, pair: Pair, origins: dict[str, Array]) -> None:
         _leaf(SubElement(joint, "axis2"), "xyz", pair.second_axis)
 
 
-def add_driver(model: Element, joint: str, rate: float) -> None:
+def _add_driver(model: Element, joint: str, rate: float) -> None:
     """Write the drive of a joint as Gazebo's controller of its speed."""
     plugin = SubElement(model, "plugin", CONTROLLER)
     _leaf(plugin, "joint_name", joint)
@@ -311,3 +318,154 @@ def _leaf(parent: Element, tag: str, content: str | float | Array) -> None:
 
 def _leaf_pose(parent: Element, place: Array) -> None:
     _leaf(parent, "pose", np.append(place, np.zeros(3)))
+
+
+# ---- URDF ---------------------------------------------------------------------------------------------------------
+
+
+def read_urdf(path: Path, options: ImportOptions) -> Draft:
+    """Read the mechanism of a URDF file at the zero of its joints.
+
+    Loops are closed by joints under `<gazebo>`, or by links without mass, fixed to two bodies, whose frames coincide.
+    """
+    root = parsed(path, "robot")
+    if any("xacro" in element.tag for element in root.iter()):
+        raise refused("has elements of xacro", remedy="expand it: xacro FILE > FILE.urdf")
+    model, world = _model_of(root)
+    reader = _Reader(root.get("name", ""), "1.9")
+    draft = reader.draft
+    reader.add_model(model, "", WORLD)
+    for part in root.iterfind("transmission/joint"):
+        draft.drives.setdefault(part.get("name", ""), 0.0)
+    draft.note("exchange.gravity", "", "is read without gravity, which URDF does not state", "add gravity to the model")
+    reader.add_joints()
+    _frames(draft, closes=root.find("gazebo/joint") is None)
+    return reader.settled(world, options.ground)
+
+
+def _model_of(root: Element) -> tuple[Element, str]:
+    """The SDF model of a robot, and the name of the link that carries all others."""
+    model = Element("model")
+    links: dict[str, Element] = {}
+    for link in root.findall("link"):
+        links[link.get("name", "")] = made = SubElement(model, "link", name=link.get("name", ""))
+        inertial, inertia_entry = SubElement(made, "inertial"), link.find("inertial")
+        mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
+        SubElement(inertial, "mass").text = "0" if mass is None else mass.get("value", "")
+        entries = SubElement(inertial, "inertia")
+        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
+            SubElement(entries, key).text = "0" if inertia is None else inertia.get(key)
+        if inertia_entry is not None:
+            _add_pose(inertial, inertia_entry)
+        made.extend([*link.findall("visual"), *link.findall("collision")])
+    inner: set[str] = set()
+    for part in root.findall("joint"):
+        child = _end_of(part, "child")
+        if child not in links or child in inner:
+            what = f"has the child {child!r}, which is no link of the file or already has a parent"
+            raise refused(what, f"joint {part.get('name')}", "state what closes a loop as an SDF joint under <gazebo>")
+        inner.add(child)
+        _add_pose(links[child], part, _end_of(part, "parent"))
+        model.append(_joint_of(part))
+    model.extend(child for part in root.findall("gazebo") if part.get("reference") is None for child in part)
+    outer = [name for name in links if name not in inner]
+    if len(outer) != 1:
+        raise refused(f"has {len(outer)} links without a parent: {', '.join(outer[:5])}", remedy="it must be a tree")
+    return model, outer[0]
+
+
+def _joint_of(part: Element) -> Element:
+    """The SDF joint of a joint of URDF: its frame is that of its child."""
+    joint = Element("joint", name=part.get("name", ""), type=part.get("type", ""))
+    joint.extend([*part.findall("parent"), *part.findall("child")])
+    axis, limit, mimic, dynamics = (part.find(tag) for tag in ("axis", "limit", "mimic", "dynamics"))
+    made = SubElement(joint, "axis")
+    SubElement(made, "xyz").text = "1 0 0" if axis is None else axis.get("xyz", "")
+    if limit is not None and part.get("type") != "continuous" and {"lower", "upper"} <= limit.attrib.keys():
+        limit_element = SubElement(made, "limit")
+        for end in ("lower", "upper"):
+            SubElement(limit_element, end).text = limit.get(end)
+    if mimic is not None:
+        coupling = SubElement(made, "mimic", joint=mimic.get("joint", ""))
+        SubElement(coupling, "multiplier").text = mimic.get("multiplier", "1")
+    for key, value in [] if dynamics is None else dynamics.items():
+        SubElement(made, key).text = value
+    return joint
+
+
+def _add_pose(made: Element, source: Element, relative: str = "") -> None:
+    """Write an origin as a pose."""
+    origin = source.find("origin")
+    xyz, rpy = ("0 0 0", "0 0 0") if origin is None else (origin.get("xyz", "0 0 0"), origin.get("rpy", "0 0 0"))
+    pose = SubElement(made, "pose", {"relative_to": relative} if relative else {})
+    pose.text = f"{xyz} {rpy}"
+
+
+def _frames(draft: Draft, closes: bool) -> None:
+    """Make points of links without mass that are fixed to a body and carry nothing.
+
+    closes: whether two of them at one place, on bodies that no joint joins, close a loop, by a ball.
+    """
+    counts = Counter(link for pair in draft.pairs.values() for link in pair.links)
+    ends: list[tuple[str, str, Array]] = []
+    for name, pair in list(draft.pairs.items()):
+        holder, frame = pair.links
+        if pair.type == "fixed" and counts[frame] == 1 and not draft.bodies[frame].mass > 0:
+            draft.bodies[holder].points[frame] = pair.at
+            ends.append((frame, holder, pair.at))
+            del draft.pairs[name], draft.bodies[frame]
+    joined = {frozenset(pair.links) for pair in draft.pairs.values()}
+    for number, (name, body, place) in enumerate(ends if closes else []):
+        for other_name, other, other_place in ends[:number]:
+            if other != body and frozenset((body, other)) not in joined and np.linalg.norm(place - other_place) < APART:
+                draft.pairs[name] = Pair(name, "spherical", (other, body), place)
+                what = f"is taken as a ball that closes a loop: the frames {other_name} and {name} coincide"
+                draft.warn("exchange.loop", f"joints.{name}", what, "if it is a pin, make it revolute about an axis")
+
+
+def write_urdf(positions: Positions, path: Path) -> list[Finding]:
+    """Write the mechanism as URDF: a tree of links with the global axes; Gazebo's joints close its loops.
+
+    Pairs that URDF lacks are rows of joints with links without mass between.
+    """
+    draft = opening(positions, "gravity")
+    root, gazebo = Element("robot", name=draft.name or "mechanism"), Element("gazebo")
+    origins, inner, closing, rates = laid_out(draft, ("cylindrical", "helical", "universal", "spherical"))
+    for name, origin in origins.items():
+        link, body = SubElement(root, "link", name=name), draft.bodies.get(name, Body(name))
+        if body.mass > 0:
+            inertial = SubElement(link, "inertial")
+            SubElement(inertial, "origin", xyz=text_of(body.centre - origin))
+            SubElement(inertial, "mass", value=text_of(body.mass))
+            entries = {f"i{'xyz'[i]}{'xyz'[j]}": text_of(body.inertia[i, j]) for i in range(3) for j in range(i, 3)}
+            SubElement(inertial, "inertia", entries)
+        for point, place in body.points.items():
+            frame = f"{name}.{point}"
+            SubElement(root, "link", name=frame)
+            _tree_joint(root, Pair(frame, "fixed", (name, frame), place), {name: origin, frame: place})
+    for pair in inner:
+        _tree_joint(root, pair, origins)
+    for pair in closing:
+        _add_joint(gazebo, pair, origins)
+    for name, rate in rates.items():
+        _add_driver(gazebo, name, rate)
+    root.append(gazebo)
+    written(root, path)
+    return draft.findings
+
+
+def _tree_joint(root: Element, pair: Pair, origins: dict[str, Array]) -> None:
+    """Write a joint of the tree, at the origin of its child."""
+    turns = pair.type == "revolute"
+    joint = SubElement(root, "joint", name=pair.name, type="continuous" if turns and pair.limits is None else pair.type)
+    SubElement(joint, "origin", xyz=text_of(origins[pair.links[1]] - origins[pair.links[0]]))
+    SubElement(joint, "parent", link=pair.links[0])
+    SubElement(joint, "child", link=pair.links[1])
+    if pair.type != "fixed":
+        SubElement(joint, "axis", xyz=text_of(pair.axis))
+    if pair.type == "prismatic" or (turns and pair.limits is not None):
+        low, high = pair.limits or (-FAR, FAR)
+        SubElement(joint, "limit", {"lower": text_of(low), "upper": text_of(high), **MOST})
+    if pair.type == "prismatic" and pair.pitch is not None:
+        turn = f"{pair.name.rpartition('.')[0]}.turn"
+        SubElement(joint, "mimic", joint=turn, multiplier=text_of(pair.pitch / (2 * np.pi)))

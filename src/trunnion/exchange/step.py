@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "write", "write_moved"]
 
-MAGNIFIES = True
 PATIENCE = 60.0  # s, for the mesh of a free-form solid
 DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and angle, rad
 SIZE = 0.02  # of the mechanism: length of an axis of a skeleton that has no bearing

@@ -31,7 +31,7 @@ from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seen, kinetic_energy
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch, over_steps, step_nodes
-from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
+from trunnion.dynamics.state import Accelerated, FreeMotion, Mode, Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset, least_clearance
 
 __all__ = ["ActiveMotion", "ActiveSet", "OpenContact", "RowMode", "RowModes", "settled"]
@@ -320,16 +320,17 @@ class ActiveMotion(Integration):
             return self.dynamics.look(self.layout.moment(times, np.asarray(dense(times)), self.mode))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
-        """Those of contacts, then those of joints, then that of the clutch."""
-        senses = stretch.mode.senses
-        waits = senses[:1] == (0,) and self._may_change()
-        if not (self.motion.several or self.count or self.layout.clutched or waits):
+        """Those of contacts, of joints, of the clutch, and of the bends on either side of one coordinate that moves."""
+        if stretch.resting and not (self.motion.several or self._may_change()):
             return None
 
         def values(times: Array) -> Array:
             at = stretch.at(self.layout, times)
             with np.errstate(all="ignore"):
-                return np.vstack([self._gaps(at), self._of_joints(at), self._of_clutch(at)])
+                rows = [self._gaps(at), self._of_joints(at), self._of_clutch(at)]
+            if not (self.motion.several or stretch.resting):
+                rows += [at.q - self.between[0], self.between[1] - at.q]
+            return np.vstack(rows)
 
         return values
 
@@ -349,9 +350,8 @@ class ActiveMotion(Integration):
         """Speeds in their sense of the joints that slide, and what is left to those that stick before they break away,
         (joint, lane)."""
         senses = np.array(at.senses)[:, None]
-        if not self.motion.several:  # where it comes to rest is approached by the steps themselves
-            rests = self.motion.rests(at)
-            return -np.max(self.motion.excess(at), axis=0)[None] if rests else np.ones((len(at.senses), len(at.time)))
+        if not self.motion.several:
+            return -np.max(self.motion.excess(at), axis=0)[None] if self.motion.rests(at) else senses * at.rate
         if not at.senses:
             return np.empty((0, len(at.time)))
         if np.all(senses != 0):
@@ -367,9 +367,11 @@ class ActiveMotion(Integration):
         """What is left of the slip of a clutch, or of the capacity of one that holds, (0 or 1, lane)."""
         if at.slips:
             return at.slips * at.slip
-        if not (self.layout.clutched and self._drive.engaged(at.now)):
-            return np.empty((0, len(at.time)))
-        return (self._capacity - np.abs(self._carried(at)))[None]
+        return (self._capacity - np.abs(self._carried(at)))[None] if self._clutch_watched(at) else at.slip[:0]
+
+    def _clutch_watched(self, at: Mode | Moment) -> bool:
+        """Whether a clutch slips, or holds while it is engaged."""
+        return bool(at.slips) or (self.layout.clutched and self._drive.engaged(at.now))
 
     @property
     def _capacity(self) -> float:
@@ -385,14 +387,21 @@ class ActiveMotion(Integration):
         """Let a contact begin or end, or a clutch; of a joint that is decided before the next step."""
         if crossing.row < self.rows:
             return self._met(crossing.row, crossing.time, row)
-        joint = crossing.row - self.rows
-        if joint < len(self.mode.senses):
-            self._crossed = joint
-        elif self.mode.slips:
+        k = crossing.row - self.rows
+        joints, clutches = len(self.mode.senses), int(self._clutch_watched(self.mode))
+        if k < joints and self.motion.several:
+            self._crossed = k
+        elif k < joints and not self.resting:
+            row[self.layout.coordinates] = 0.0
+        elif joints <= k < joints + clutches and self.mode.slips:
             row[self.layout.slip] = 0.0
-        else:
+        elif joints <= k < joints + clutches:
             at = self.solution.stretches[-1].at(self.layout, np.array([crossing.time]))
             self._let_go = float(np.sign(self._carried(at)[0]))
+        elif k >= joints + clutches:
+            row[0] = self.between[k - joints - clutches]
+            if (module := self._meeting(row[0])) is not None:
+                self.end("change_point", crossing.time, self.motion.change_point(module, float(row[0])))
         return np.inf
 
     def _met(self, k: int, time: float, row: Array) -> float:

@@ -97,8 +97,8 @@ class Guards:
 
     def __post_init__(self) -> None:
         motion, alone = self.motion, len(self.motion.system.mechanism.drivers) == 1
-        # of several free coordinates those that have a range
-        self._limited = [(k, name) for k, name in enumerate(motion.names) if motion.several and name in self.limits]
+        limits = [(k, self.limits[name]) for k, name in enumerate(motion.names) if name in self.limits]
+        self._limited = [(k, ends) for k, ends in limits if np.any(np.isfinite(ends))]
         # modules that are looked at, with their rows of `margins`: of one driver alone those that are passed
         self._meeting = [(row, k) for row, k in enumerate(motion.meeting) if not alone or motion.passes(k)]
 
@@ -115,20 +115,20 @@ class Guards:
 
     def _out_of_range(self, stretch: Stretch) -> Iterator[Ended]:
         n = self.layout.coordinates
-        for k, name in self._limited:
+        for k, ends in self._limited:
             times = np.linspace(stretch.begin, stretch.end, LOOKS + 1)
             rates = stretch.state(times)[n + k]
             turns = np.flatnonzero(rates[1:] * rates[:-1] < 0.0)  # not where the motion has ended: NaN
             times = np.unique([*times, *(_root(stretch, n + k, 0.0, times[i], times[i + 1]) for i in turns)])
             places = stretch.state(times)[k]
-            for level, outward in zip(self.limits[name], (-1.0, 1.0), strict=True):
+            for level, outward in zip(ends, (-1.0, 1.0), strict=True):
                 outside_by = outward * (places - level)
                 outside = np.flatnonzero(outside_by > ROUNDING * max(1.0, abs(level)))
                 if len(outside):
                     i = int(outside[0])
-                    inside = i > 0 and outside_by[i - 1] < 0.0
-                    time = _root(stretch, k, level, times[i - 1], times[i]) if inside else float(times[max(i - 1, 0)])
-                    yield Ended("simulate.range", time, {"driver": name, "coordinate": level})
+                    inside = np.flatnonzero(outside_by[:i] < 0.0)
+                    time = _root(stretch, k, level, times[inside[-1]], times[i]) if len(inside) else stretch.begin
+                    yield Ended("simulate.range", time, {"driver": self.motion.names[k], "coordinate": level})
 
     # ---- change points ----------------------------------------------------------------------------------------
 

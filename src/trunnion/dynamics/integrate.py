@@ -11,11 +11,12 @@ What holds, slips and is open until then: see `active_motion`.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from trunnion.algebra.dual import single
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
-from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
+from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
 from trunnion.dynamics.start import Places
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
@@ -46,7 +47,7 @@ STUCK = 50  # events at one time
 LOOKS, SCANNED = 12, 200  # times within a step, and within a rest, at which one looks for what changes
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 NEAR = 1e-8  # of the coordinate: places that are one
-SLIGHT = 1e-6  # of a typical acceleration: one that may be rounding
+PAST = 1e-6  # of a step: by how much one that is taken anew goes past the place at which it is to end
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
 MEETING = 1e-3  # likewise, of a bend at which assemblies meet: the digits of the accelerations are lost like its square
 
@@ -61,13 +62,6 @@ class _Changed(Exception):  # noqa: N818 (it is no error)
     def __init__(self, crossing: Crossing, stretch: Stretch) -> None:
         super().__init__()
         self.crossing, self.stretch = crossing, stretch
-
-
-class Passing(NamedTuple):
-    """A number of the state, by its place in the row, and the value that it passes."""
-
-    number: int
-    value: float
 
 
 @dataclass
@@ -92,6 +86,8 @@ class Integration(ABC):
     resting: bool = False
 
     def __post_init__(self) -> None:
+        self.step = 0.0  # size of the next step, s; 0: it is to be looked for
+        self.between = -np.inf, np.inf  # the bends on either side of one free coordinate
         self.layout, self.bends = Layout.of(self.motion), self.places.bends
         self.solution = Solution(self.layout)
         switch_times = [time for drive in self.motion.drives.values() for time in drive.times]
@@ -118,7 +114,7 @@ class Integration(ABC):
         self._follow(self.start, row)
         if not self._begins(row):
             return
-        before, time, step, stayed = self.start - 1.0, self.start, None, 0
+        before, time, stayed = self.start - 1.0, self.start, 0
         for _ in range(MOST_EVENTS):
             self.last = time, row
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
@@ -133,12 +129,12 @@ class Integration(ABC):
             if not self._decided(time, row):
                 return
             try:
-                time, row, step = self._move(time, row, until, step)
+                time, row = self._move(time, row, until)
             except _Changed as change:
                 time, stretch = change.crossing.time, change.stretch
                 row = stretch.state(np.array([time]))[:, 0]
                 self._follow(time, row)
-                step = min(self._changed(change.crossing, row), stretch.end - stretch.begin)
+                self.step = min(self._changed(change.crossing, row), self.step)
         self.end("events", time, {"count": float(MOST_EVENTS)})
 
     def moment(self, time: float, row: Array) -> Moment:
@@ -200,16 +196,16 @@ class Integration(ABC):
     def _note(self, time: float, kind: str, figure: float = np.nan, unit: str = "") -> None:
         self.solution.events.append(Event(time, kind, self.motion.names[0], figure, unit))
 
-    def _add(self, begin: float, end: float, state: Callable[[Array], Array]) -> None:
+    def _crossing(self, stretch: Stretch) -> Crossing | None:
+        """The first change within a step."""
+        if (values := self._values(stretch)) is None:
+            return None
+        looks = SCANNED if stretch.resting and not self.motion.several else LOOKS
+        return first_crossing(values, stretch.begin, np.linspace(stretch.begin, stretch.end, looks + 1)[1:])
+
+    def _add(self, full: Stretch, crossing: Crossing | None) -> None:
         """Add a step, up to where its mode changes or the motion ends in it."""
-        full = stretch = Stretch(begin, end, state, self.mode, self.resting, self.snapshot)
-        stretches, crossing = self.solution.stretches, None
-        if values := self._values(stretch):
-            looks = SCANNED if stretch.resting and not self.motion.several else LOOKS
-            times = np.linspace(stretch.begin, stretch.end, looks + 1)[1:]
-            crossing = first_crossing(values, stretch.begin, times)
-        if crossing is not None:
-            stretch = stretch._replace(end=crossing.time)
+        stretch, stretches = full if crossing is None else full._replace(end=crossing.time), self.solution.stretches
         stretch, ended = self.guards.bounded(stretch, stretches[-1] if stretches else None)
         self._measured(stretch)
         stretches.append(stretch)
@@ -238,61 +234,66 @@ class Integration(ABC):
 
     # ---- in motion --------------------------------------------------------------------------------------------
 
-    def _move(self, time: float, row: Array, until: float, step: float | None) -> tuple[float, Array, float | None]:
-        """Move, or rest, until the next place where a force jumps or bends, a rest, or the next break."""
-        n = self.layout.coordinates
-        between = self._place(float(row[0]), self.sense or float(np.sign(row[n])))
-        rate = self._rate(between)
-        if row[n] == 0.0 and row[0] in self.ends[:, 0]:
-            outward = np.sign(row[0] - np.mean(self.ends[:, 0])) * rate(time, row)[n]
-            if outward > SLIGHT * self.motion.unit[0]:  # else it is rounding, or ends by the steps that follow
-                self._end_at(time, float(row[0]))
-                return time, row, None
-        first = min(step, 0.5 * (until - time)) if step else None
-        if self.motion.stays(self.moment(time, row)):
-            first = until - time
-        absolute, marks = self._absolute(row), [time]
-        solver = self._solver(rate, time, row, until, absolute, first)
-        dead_centre = DeadCentre(self.motion, self.layout)
+    def _move(self, time: float, row: Array, until: float) -> tuple[float, Array]:
+        """Move, or rest, until the next break, or until something changes within a step: see `_Changed`.
+
+        A step that runs past a place at which a force jumps or bends is taken anew, up to that place.
+        """
+        self.between = self._place(float(row[0]), self.sense or float(np.sign(row[self.layout.coordinates])))
+        rate, absolute, marks = self._rate(), self._absolute(row), [time]
+        stays = self.motion.stays(self.moment(time, row))
+        first = until - time if stays else min(self.step, until - time)
+        solver, dead_centre = (
+            self._solver(rate, time, row, until, absolute, first),
+            DeadCentre(self.motion, self.layout),
+        )
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
             marks.append(before)
             if any(len(marks) > k and before - marks[-k] < crept * self.duration for k, crept in CREEPING):
                 return self._failed(before, row)
-            size = float(getattr(solver, "h_abs", None) or solver.step_size or 0.0)  # of the step that comes
-            near = self._near(row, between, min(size, until - before), rate, before)
-            solver = solver if near else self._stepped(solver, rate, absolute)
-            if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
+            solver = self._stepped(solver, rate, absolute, stays)
+            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
                 return self._failed(before, row)
-            if near is None and (end := self._left_range(row, np.array(solver.y))) is not None:
-                self._end_at(before, end)
-                return before, row, None
-            passed = near or self._passed(row, np.array(solver.y), between)
-            if passed is not None and passed.number == 0 and row[n] == 0.0:  # from rest: nearer first
-                size = 0.25 * (float(solver.t) - before)
-                solver = self._solver(rate, before, row, until, self._absolute(row), size)
-                continue
-            if passed is not None:
-                last = float(solver.step_size or 0.0)
-                return (*self._approach(before, row, passed, until, rate), last or None)
-            self._add(before, float(solver.t), solver.dense_output())
-            self._follow(float(solver.t), np.array(solver.y))
+            end = float(solver.t)
+            stretch = Stretch(before, end, solver.dense_output(), self.mode, self.resting, self.snapshot)
+            crossing = self._crossing(stretch)
+            if crossing is not None and not self.motion.several:
+                near = crossing.time + PAST * (crossing.time - before)
+                if near < end - PAST * (end - before):
+                    solver = self._solver(rate, before, row, near, absolute, near - before)
+                    continue
+            self._add(stretch, crossing)
+            self._follow(end, np.array(solver.y))
             self._end_step(solver, np.array(solver.y))
             self._compare(before, row)
-            if event := dead_centre.reached(solver, float(solver.t) - before):
+            if event := dead_centre.reached(solver, end - before):
                 self._turns_round(*event)
                 break
-        return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
+        return float(solver.t), np.array(solver.y)
+
+    def _foreseen(self, row: Array, second: float) -> float:
+        """Time, s, until one free coordinate comes to a bend or to rest, as its acceleration has it."""
+        speed = float(row[self.layout.coordinates])
+        if self.motion.several or self.resting or speed == 0.0 or not np.isfinite(second):
+            return np.inf
+        left = (self.between[1] if speed > 0.0 else self.between[0]) - float(row[0])
+        turns = -speed / second if self.sense and speed * second < 0.0 else np.inf
+        root = speed * speed + 2.0 * second * left
+        if not np.isfinite(left) or root < 0.0:
+            return turns
+        return min(turns, 2.0 * left / (speed + math.copysign(math.sqrt(root), speed)))
 
     @property
     def sense(self) -> int:
         """Of the motion of one free coordinate that may rest; else 0."""
         return self.mode.senses[0] if self.mode.senses and not self.motion.several else 0
 
-    def _rate(self, between: tuple[float, float]) -> Callable[[float, Array], Array]:
+    def _rate(self) -> Callable[[float, Array], Array]:
         """The derivative of a row by time, within one stretch: nothing beyond its ends is asked for."""
         n, sense = self.layout.coordinates, self.sense
-        low, high = (end + side * self._inside(end) for end, side in zip(between, (1.0, -1.0), strict=True))
+        low, high = max(self.between[0], self.ends[0, 0]), min(self.between[1], self.ends[1, 0])
+        low, high = low + self._inside(low), high - self._inside(high)
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
@@ -319,124 +320,39 @@ class Integration(ABC):
 
     def _solver(
         self, rate: Callable[[float, Array], Array], begin: float, row: Array, end: float, absolute: Array,
-        first: float | None = None,
+        first: float = 0.0,
     ) -> OdeSolver:  # fmt: skip
+        """first: how long the first step is tried, s; 0: it is to be looked for."""
         kind = LSODA if self.motion.bristles else DOP853
-        if first is None and not np.all(np.isfinite(rate(begin, row))):
+        if not first and not np.all(np.isfinite(rate(begin, row))):
             first = 1e-12 * abs(end - begin)  # SciPy would look for one without end; so the first step fails
-        return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first)
+        return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first or None)
 
-    def _stepped(self, solver: OdeSolver, rate: Callable[[float, Array], Array], absolute: Array) -> OdeSolver:
-        """One step. LSODA does not get over an unknown rate: it begins anew, shorter."""
-        begin, state = float(solver.t), np.array(solver.y)
+    def _stepped(
+        self, solver: OdeSolver, rate: Callable[[float, Array], Array], absolute: Array, stays: bool
+    ) -> OdeSolver:
+        """One step, no farther than a bend that is foreseen; the size that it may have else is that of the next.
+
+        LSODA does not get over an unknown rate: it begins anew, shorter.
+        """
+        begin, state, end = float(solver.t), np.array(solver.y), float(solver.t_bound)
+        if isinstance(solver, DOP853):
+            size = max(self.step, solver.h_abs)
+            reach = min(self._foreseen(state, float(solver.f[self.layout.coordinates])), end - begin)
+            solver.h_abs = min(size, reach)
+            solver.step()
+            if not stays:
+                reached = reach < size and solver.t >= begin + (1.0 - PAST) * reach
+                self.step = size if reached else float(solver.h_abs)
+            return solver
         solver.step()
-        for k in range(1, RETRIES + 1 if self.motion.bristles else 0):
+        for k in range(1, RETRIES + 1):
             if solver.status != "failed" and np.all(np.isfinite(solver.y)):
                 break
-            end = float(solver.t_bound)
             solver = self._solver(rate, begin, state, end, absolute, 0.01**k * abs(end - begin))
             solver.step()
+        self.step = float(solver.step_size or 0.0)
         return solver
-
-    def _near(
-        self, row: Array, between: tuple[float, float], step: float, rate: Callable[[float, Array], Array], time: float
-    ) -> Passing | None:
-        """The bend that the next step would pass, foreseen by the speed; not if it turns round before."""
-        n = self.layout.coordinates
-        speed = float(row[n])
-        level = between[1] if speed > 0 else between[0]
-        if self.motion.several or not np.isfinite(level) or speed == 0.0:
-            return None
-        if not (level - row[0]) / speed < step:
-            return None
-        reached = speed * speed + 2.0 * float(rate(time, row)[n]) * (level - float(row[0]))
-        return Passing(0, level) if reached > 0.0 else None
-
-    def _left_range(self, before: Array, after: Array) -> float | None:
-        """The end of its range that one coordinate, which stood there, has left by more than rounding."""
-        for end, outward in zip(self.ends[:, 0], (-1.0, 1.0), strict=True) if not self.motion.several else ():
-            slack = NEAR * max(1.0, abs(end))
-            if abs(before[0] - end) <= slack < outward * (after[0] - end):
-                return float(end)
-        return None
-
-    def _passed(self, before: Array, after: Array, between: tuple[float, float]) -> Passing | None:
-        """What a step has passed: the speed 0, or else a bend; the step is then taken anew, up to it."""
-        n = self.layout.coordinates
-        if self.sense and self.sense * after[n] <= 0.0:
-            return Passing(n, 0.0)
-        if not self.motion.several:
-            low, high = self.ends[:, 0]
-            for level in between:
-                if level in (low, high) and low <= after[0] <= high:  # it comes back by rounding
-                    continue
-                if np.isfinite(level) and (before[0] - level) * (after[0] - level) < 0:
-                    ahead = (level - before[0]) * before[n] > 0.0
-                    return Passing(0, level) if ahead or before[n] == 0.0 else Passing(n, 0.0)
-        return None
-
-    def _approach(
-        self, time: float, row: Array, to: Passing, until: float, rate: Callable[[float, Array], Array]
-    ) -> tuple[float, Array]:
-        """Move exactly to where a number of the state has a value: that number takes the place of the time.
-
-        M. Hénon, On the numerical computation of Poincaré maps, Physica D 5 (1982) 412-414,
-        doi:10.1016/0167-2789(82)90034-3. No force beyond the place is asked for. Where another number gets to its own
-        place first, as a speed that becomes 0 before the bend, that one is approached instead.
-        """
-        n, k = self.layout.coordinates, to.number
-
-        def by_number(value: float, numbers: Array) -> Array:
-            state = numbers.copy()
-            moment, state[k] = float(numbers[k]), value
-            if k == 0 and self.sense and self.sense * state[n] <= 0.0:
-                return np.full_like(state, np.nan)  # it turns round before
-            numbers_at = rate(moment, state)
-            pace = numbers_at[k]
-            if not pace * (to.value - begin) > 0.0:
-                return np.full_like(state, np.nan)  # it does not go there
-            with np.errstate(all="ignore"):
-                slopes: Array = numbers_at / pace
-                slopes[k] = 1.0 / pace
-            return slopes
-
-        begin, state = float(row[k]), row.copy()
-        if begin == to.value:
-            if k == 0:
-                self._end_at(time, to.value)
-            return time, row
-        state[k], absolute = time, self._absolute(row)
-        absolute[k] = self.tolerance / max(float(np.max(self.pace)), 1e-300)
-        solver = self._solver(by_number, begin, state, to.value, absolute)
-        while solver.status == "running":
-            last, last_row = float(solver.t), np.array(solver.y)
-            if last == begin:
-                solver = self._stepped(solver, by_number, absolute)
-            else:
-                solver.step()
-            wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), last_row.copy()
-            before[k] = last
-            if wrong and k == 0 and before[n] != 0.0:  # it turns round before the place
-                return self._approach(float(last_row[k]), before, Passing(n, 0.0), until, rate)
-            if wrong:
-                return self._failed(float(last_row[k]), before)[:2]
-            if solver.y[k] > until:
-                return self._plain(float(last_row[k]), before, until, rate)
-            along = by_time(solver.dense_output(), last, float(solver.t), k)
-            self._add(float(last_row[k]), float(solver.y[k]), along)
-        numbers_at = np.array(solver.y)
-        end, numbers_at[k] = float(numbers_at[k]), to.value
-        self._follow(end, numbers_at)
-        if k == 0:
-            self._end_at(end, to.value)
-        return end, numbers_at
-
-    def _end_at(self, time: float, coordinate: float) -> None:
-        """End the motion where a coordinate is the end of the range, or that of a change point."""
-        if coordinate in self.ends[:, 0]:
-            self.end("range", time, {"driver": self.motion.names[0], "coordinate": coordinate})
-        elif (module := self._meeting(coordinate)) is not None:
-            self.end("change_point", time, self.motion.change_point(module, coordinate))
 
     def _meeting(self, coordinate: float) -> int | None:
         """The module of which two assemblies meet at a bend, if they do."""
@@ -446,19 +362,6 @@ class Integration(ABC):
             if abs(apart) < NEAR * max(1.0, abs(coordinate)):
                 return module
         return None
-
-    def _plain(
-        self, time: float, row: Array, until: float, rate: Callable[[float, Array], Array]
-    ) -> tuple[float, Array]:
-        """Up to a break in time that comes before the place is reached."""
-        solver = self._solver(rate, time, row, until, self._absolute(row))
-        while solver.status == "running":
-            before = float(solver.t)
-            solver.step()
-            if solver.status == "failed":
-                return self._failed(before, np.array(solver.y))[:2]
-            self._add(before, float(solver.t), solver.dense_output())
-        return float(solver.t), np.array(solver.y)
 
     def _absolute(self, row: Array) -> Array:
         """Absolute tolerances: a share of what is typical of each number."""
@@ -478,36 +381,32 @@ class Integration(ABC):
         return tolerances
 
     def _place(self, q: float, sense: float) -> tuple[float, float]:
-        """The coordinates on either side of q at which a step ends; a coordinate that is one of them is left behind."""
-        bends = np.asarray(self.bends, float)
-        low, high = (float(end) for end in self.ends[:, 0])
-        if len(bends):
-            period = self.places.period or 0.0
-            laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else [0.0]
-            every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
-            near = 1e-12 * max(1.0, abs(q))
-            # one at q itself is behind, by the way it goes
-            below = every[every < q + (near if sense > 0 else -near)]
-            above = every[every > q - (near if sense < 0 else -near)]
-            low = max(low, below[-1]) if len(below) else low
-            high = min(high, above[0]) if len(above) else high
-        return low, high
+        """The bends on either side of q, at which a step ends; one at q itself is left behind, by the way it goes."""
+        period, near = self.places.period or 0.0, 1e-12 * max(1.0, abs(q))
+        laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else np.zeros(1)
+        every = np.sort((np.asarray(self.bends, float) + laps[:, None]).ravel())
+        below, above = (
+            every[every < q + (near if sense > 0 else -near)],
+            every[every > q - (near if sense < 0 else -near)],
+        )
+        return float(below[-1]) if len(below) else -np.inf, float(above[0]) if len(above) else np.inf
 
-    def _failed(self, time: float, row: Array) -> tuple[float, Array, None]:
+    def _failed(self, time: float, row: Array) -> tuple[float, Array]:
         """Say why there is no next step; a linkage that locks as it runs stops."""
+        self.step = 0.0
         n, row, soon = self.layout.coordinates, row.copy(), AHEAD / float(np.max(self.pace))
         ahead, later = row.copy(), row.copy()
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
         later[:n] += soon * row[n : 2 * n]
         causes = [self._cause(*state) for state in ((time, row), (time, ahead), (time + soon, later))]
         if self._locked(time, row, causes):
-            return time, row, None
+            return time, row
         code = next(filter(None, causes), "step")
         if code == "not_assembled" and not causes[0] and not self.motion.several:  # it can be assembled until then
             self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
         else:
             self._stop(code, time, row)
-        return time, row, None
+        return time, row
 
     def _turns_round(self, time: float, figures: dict[str, float]) -> None:
         """End at the dead centre of the driven joint."""

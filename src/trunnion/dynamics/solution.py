@@ -15,11 +15,10 @@ from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import Mode, Moment
 
-__all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch", "by_time", "over_steps", "step_nodes"]
+__all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch", "over_steps", "step_nodes"]
 
 Array = NDArray[np.float64]
 
-SECANTS = 8  # rounds to the place of a time in a step along another number
 CLOSE = 1e-13  # of the time or coordinate: places that are one
 
 
@@ -109,28 +108,6 @@ class Solution:
                 rows_at[:, lanes] = self.stretches[k].state(time[lanes])
                 which[lanes] = k
         return rows_at, which
-
-
-def by_time(dense: Callable[[Array], Array], low: float, high: float, k: int) -> Callable[[Array], Array]:
-    """The state at times, of a step along its k-th number: by the secant to where the time is that."""
-    begin, end = float(dense(np.array([low]))[k, 0]), float(dense(np.array([high]))[k, 0])
-
-    def state(time: Array) -> Array:
-        """Rising or falling, the time is nearly even along a step: a few rounds get it to rounding."""
-        time = np.clip(time, begin, end)
-        before, after = np.full(np.shape(time), low), low + (high - low) * (time - begin) / (end - begin)
-        at_before = begin - time
-        for _ in range(SECANTS):
-            at_after = dense(after)[k] - time
-            with np.errstate(all="ignore"):
-                step = at_after * (after - before) / (at_after - at_before)
-            before, at_before = after, at_after
-            after = np.clip(after - np.where(np.isfinite(step), step, 0.0), min(low, high), max(low, high))
-        rows = np.array(dense(after))
-        rows[k] = after
-        return rows
-
-    return state
 
 
 def step_nodes(begins: Array) -> Array:

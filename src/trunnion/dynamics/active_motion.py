@@ -305,6 +305,8 @@ class ActiveMotion(Integration):
         self._crossed: int | None = None  # joint that has changed
         self._let_go = 0.0  # sense in which a clutch that held begins to slip
         self._drive = next(iter(self.motion.drives.values()))
+        # controllers, by number, with +1 while they are at their limit, else −1
+        self._limited = {i: -1.0 for i, drive in enumerate(self.motion.drives.values()) if drive.controlled}
         self._clutch = "holds" if self._drive.engaged(self.start) else "opens"
 
     @property
@@ -320,7 +322,7 @@ class ActiveMotion(Integration):
             return self.dynamics.look(self.layout.moment(times, np.asarray(dense(times)), self.mode))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
-        """Those of contacts, of joints, of the clutch, and of the bends on either side of one coordinate that moves."""
+        """Those of contacts, joints, the clutch, controllers, and of the bends on either side of one coordinate."""
         if stretch.resting and not (self.motion.several or self._may_change()):
             return None
 
@@ -328,6 +330,7 @@ class ActiveMotion(Integration):
             at = stretch.at(self.layout, times)
             with np.errstate(all="ignore"):
                 rows = [self._gaps(at), self._of_joints(at), self._of_clutch(at)]
+                rows += self._of_limits(at)
             if not (self.motion.several or stretch.resting):
                 rows += [at.q - self.between[0], self.between[1] - at.q]
             return np.vstack(rows)
@@ -373,6 +376,13 @@ class ActiveMotion(Integration):
         """Whether a clutch slips, or holds while it is engaged."""
         return bool(at.slips) or (self.layout.clutched and self._drive.engaged(at.now))
 
+    def _of_limits(self, at: Moment) -> list[Array]:
+        """How far what controllers aim at is on its side of their limits, where their efforts bend."""
+        drives = list(self.motion.drives.values())
+        return [
+            sign * drives[i].excess(at.time, at.rate[i], at.integral[i], at.slip) for i, sign in self._limited.items()
+        ]
+
     @property
     def _capacity(self) -> float:
         return self._drive.clutch * (1.0 + ROUNDING)
@@ -387,21 +397,27 @@ class ActiveMotion(Integration):
         """Let a contact begin or end, or a clutch; of a joint that is decided before the next step."""
         if crossing.row < self.rows:
             return self._met(crossing.row, crossing.time, row)
-        k = crossing.row - self.rows
-        joints, clutches = len(self.mode.senses), int(self._clutch_watched(self.mode))
-        if k < joints and self.motion.several:
-            self._crossed = k
-        elif k < joints and not self.resting:
-            row[self.layout.coordinates] = 0.0
-        elif joints <= k < joints + clutches and self.mode.slips:
-            row[self.layout.slip] = 0.0
-        elif joints <= k < joints + clutches:
-            at = self.solution.stretches[-1].at(self.layout, np.array([crossing.time]))
-            self._let_go = float(np.sign(self._carried(at)[0]))
-        elif k >= joints + clutches:
-            row[0] = self.between[k - joints - clutches]
-            if (module := self._meeting(row[0])) is not None:
-                self.end("change_point", crossing.time, self.motion.change_point(module, float(row[0])))
+        rows = {
+            "joint": len(self.mode.senses), "clutch": int(self._clutch_watched(self.mode)),
+            "limit": len(self._limited), "bend": 2,
+        }  # fmt: skip
+        kind, k = [(kind, k) for kind, count in rows.items() for k in range(count)][crossing.row - self.rows]
+        match kind:
+            case "joint" if self.motion.several:
+                self._crossed = k
+            case "joint" if not self.resting:
+                row[self.layout.coordinates] = 0.0
+            case "clutch" if self.mode.slips:
+                row[self.layout.slip] = 0.0
+            case "clutch":
+                at = self.solution.stretches[-1].at(self.layout, np.array([crossing.time]))
+                self._let_go = float(np.sign(self._carried(at)[0]))
+            case "limit":
+                self._limited[list(self._limited)[k]] *= -1.0
+            case "bend":
+                row[0] = self.between[k]
+                if (module := self._meeting(row[0])) is not None:
+                    self.end("change_point", crossing.time, self.motion.change_point(module, float(row[0])))
         return np.inf
 
     def _met(self, k: int, time: float, row: Array) -> float:
@@ -564,6 +580,8 @@ class ActiveMotion(Integration):
 
     def run(self, row: Array) -> Solution:
         """The motion from an initial row; contacts that last at its end have an end that is not known."""
+        limits = self._of_limits(self.moment(self.start, row))
+        self._limited = {i: 1.0 if left[0] < 0.0 else -1.0 for i, left in zip(self._limited, limits, strict=True)}
         super().run(row)
         self.solution.impacts += [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
         self.solution.impacts.sort(key=lambda impact: impact.begin)

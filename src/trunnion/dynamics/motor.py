@@ -137,6 +137,12 @@ class Drive:
             return 0.0 * speed
         return self.motor.of.error(self.ratio * speed, time, self.parameters, integral)
 
+    def excess(self, time: Array, speed: Array, integral: Array, slip: Array) -> Array:
+        """By how much what its controller aims at is beyond its limit. slip: of a clutch, (0 or 1, lane)."""
+        assert self.motor is not None and self.motor.of.excess is not None  # noqa: PT018
+        rotor = self.ratio * speed + sum(slip)
+        return self.motor.of.excess(rotor, time, self.parameters, integral)
+
 
 def switched(drives_: Mapping[str, Drive], end: float) -> Iterator[tuple[float, str, str, float]]:
     """Time, s, kind, driver and effort of every motor that is switched off and brake that is put on up to an end."""

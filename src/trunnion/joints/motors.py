@@ -38,7 +38,8 @@ class MotorKind:
 
     function: `(speed, time, parameters, integral) -> effort` at the motor's own shaft, N m or N; speed in rad/s or m/s;
     integral: of the controller's error over time, 0 of a motor without. error: of a kind with such an integral, its
-    rate `(speed, time, parameters, integral) -> rate`. needs: keys that must be given; takes: keys that may be.
+    rate `(speed, time, parameters, integral) -> rate`; excess: by how much what it aims at is beyond its limit,
+    likewise. needs: keys that must be given; takes: keys that may be.
     """
 
     function: Callable[[Array, Array, Parameters, Array], Array]
@@ -47,6 +48,7 @@ class MotorKind:
     source: str = ""
     validity: str = ""
     error: Callable[[Array, Array, Parameters, Array], Array] | None = None
+    excess: Callable[[Array, Array, Parameters, Array], Array] | None = None
 
 
 def constant(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -89,6 +91,12 @@ def _wanted(speed: Array, parameters: Parameters, integral: Array) -> Array:
     return effort
 
 
+def over_limit(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """By how much what the controller aims at is beyond its limit."""
+    excess: Array = np.abs(_wanted(speed, parameters, integral)) - parameters["limit"]
+    return excess
+
+
 # of the limit: by how much what is wanted may exceed it before the integral is held. At the limit itself it would be
 # held and let go in turn, endlessly often, where the speed rises as fast as the integral makes up for.
 BEYOND = 0.01
@@ -126,6 +134,7 @@ MOTORS: dict[str, MotorKind] = {
         source="K. J. Åström, R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press, 2021, chapter 11",
         validity="a servo drive whose current loop is fast against the mechanism",
         error=control_error,
+        excess=over_limit,
     ),
 }
 

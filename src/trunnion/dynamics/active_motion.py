@@ -31,7 +31,7 @@ from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seen, kinetic_energy
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch, over_steps, step_nodes
-from trunnion.dynamics.state import Accelerated, FreeMotion, Mode, Moment
+from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset, least_clearance
 
 __all__ = ["ActiveMotion", "ActiveSet", "OpenContact", "RowMode", "RowModes", "settled"]
@@ -299,7 +299,7 @@ class ActiveMotion(Integration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.count = self.rows = len(self.motion.contacts)  # rows of `_gaps`
+        self.count = len(self.motion.contacts)
         self.mode = self.mode._replace(onsets=(None,) * self.count)
         self._open: dict[int, OpenContact] = {}
         self._crossed: int | None = None  # joint that has changed
@@ -322,20 +322,28 @@ class ActiveMotion(Integration):
             return self.dynamics.look(self.layout.moment(times, np.asarray(dense(times)), self.mode))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
-        """Those of contacts, joints, the clutch, controllers, and of the bends on either side of one coordinate."""
         if stretch.resting and not (self.motion.several or self._may_change()):
             return None
 
         def values(times: Array) -> Array:
-            at = stretch.at(self.layout, times)
             with np.errstate(all="ignore"):
-                rows = [self._gaps(at), self._of_joints(at), self._of_clutch(at)]
-                rows += self._of_limits(at)
-            if not (self.motion.several or stretch.resting):
-                rows += [at.q - self.between[0], self.between[1] - at.q]
-            return np.vstack(rows)
+                rows = [row for *_, row in self._guards(stretch.at(self.layout, times))]
+            return np.array(rows).reshape(len(rows), len(times))
 
         return values
+
+    def _guards(self, at: Moment) -> list[tuple[str, int, Array]]:
+        """What stays above 0 while a mode lasts: its kind, which one it is, and its values, (lane,)."""
+        guards: list[tuple[str, int, Array]] = [("contact", k, row) for k, row in enumerate(self._gaps(at))]
+        guards += [("joint", k, row) for k, row in enumerate(self._of_joints(at))]
+        if at.slips:
+            guards.append(("clutch", 0, at.slips * at.slip[0]))
+        elif self.layout.clutched and self._drive.engaged(at.now):
+            guards.append(("clutch", 0, self._capacity - np.abs(self._carried(at))))
+        guards += [("limit", i, sign * self._over_limit(i, at)) for i, sign in self._limited.items()]
+        if not (self.motion.several or self.resting):  # the bends on either side of the coordinate
+            guards += [("bend", 0, at.q[0] - self.between[0]), ("bend", 1, self.between[1] - at.q[0])]
+        return guards
 
     def _may_change(self) -> bool:
         """Whether anything may change while the one free coordinate rests."""
@@ -366,22 +374,10 @@ class ActiveMotion(Integration):
         slow = np.sqrt(self.motion.typical)[:, None]
         return np.where(senses == 0, left, senses * self.motion.speeds(walk, len(at.time)) / slow + SLACK)
 
-    def _of_clutch(self, at: Moment) -> Array:
-        """What is left of the slip of a clutch, or of the capacity of one that holds, (0 or 1, lane)."""
-        if at.slips:
-            return at.slips * at.slip
-        return (self._capacity - np.abs(self._carried(at)))[None] if self._clutch_watched(at) else at.slip[:0]
-
-    def _clutch_watched(self, at: Mode | Moment) -> bool:
-        """Whether a clutch slips, or holds while it is engaged."""
-        return bool(at.slips) or (self.layout.clutched and self._drive.engaged(at.now))
-
-    def _of_limits(self, at: Moment) -> list[Array]:
-        """How far what controllers aim at is on its side of their limits, where their efforts bend."""
-        drives = list(self.motion.drives.values())
-        return [
-            sign * drives[i].excess(at.time, at.rate[i], at.integral[i], at.slip) for i, sign in self._limited.items()
-        ]
+    def _over_limit(self, i: int, at: Moment) -> Array:
+        """By how much what a controller aims at is beyond its limit, where its effort bends."""
+        drive = list(self.motion.drives.values())[i]
+        return drive.excess(at.time, at.rate[i], at.integral[i], at.slip)
 
     @property
     def _capacity(self) -> float:
@@ -395,14 +391,12 @@ class ActiveMotion(Integration):
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """Let a contact begin or end, or a clutch; of a joint that is decided before the next step."""
-        if crossing.row < self.rows:
-            return self._met(crossing.row, crossing.time, row)
-        rows = {
-            "joint": len(self.mode.senses), "clutch": int(self._clutch_watched(self.mode)),
-            "limit": len(self._limited), "bend": 2,
-        }  # fmt: skip
-        kind, k = [(kind, k) for kind, count in rows.items() for k in range(count)][crossing.row - self.rows]
+        at = self.moment(crossing.time, row)
+        with np.errstate(all="ignore"):
+            kind, k, _ = self._guards(at)[crossing.row]
         match kind:
+            case "contact":
+                return self._met(k, crossing.time, row)
             case "joint" if self.motion.several:
                 self._crossed = k
             case "joint" if not self.resting:
@@ -410,10 +404,9 @@ class ActiveMotion(Integration):
             case "clutch" if self.mode.slips:
                 row[self.layout.slip] = 0.0
             case "clutch":
-                at = self.solution.stretches[-1].at(self.layout, np.array([crossing.time]))
                 self._let_go = float(np.sign(self._carried(at)[0]))
             case "limit":
-                self._limited[list(self._limited)[k]] *= -1.0
+                self._limited[k] *= -1.0
             case "bend":
                 row[0] = self.between[k]
                 if (module := self._meeting(row[0])) is not None:
@@ -580,8 +573,8 @@ class ActiveMotion(Integration):
 
     def run(self, row: Array) -> Solution:
         """The motion from an initial row; contacts that last at its end have an end that is not known."""
-        limits = self._of_limits(self.moment(self.start, row))
-        self._limited = {i: 1.0 if left[0] < 0.0 else -1.0 for i, left in zip(self._limited, limits, strict=True)}
+        at = self.moment(self.start, row)
+        self._limited = {i: 1.0 if self._over_limit(i, at)[0] > 0.0 else -1.0 for i in self._limited}
         super().run(row)
         self.solution.impacts += [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
         self.solution.impacts.sort(key=lambda impact: impact.begin)

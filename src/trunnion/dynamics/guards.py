@@ -10,20 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from trunnion.algebra.dual import single
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.solution import Ended, Stretch
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import FreeMotion, Moment, repeated
 from trunnion.errors import Status
 from trunnion.solve.change_points import touched
 from trunnion.solve.status import NEAR_SINGULAR, pose_status
 
-__all__ = ["Crossing", "DeadCentre", "Guards", "first_crossing"]
+__all__ = ["Crossing", "Guards", "dead_centre", "first_crossing"]
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,6 @@ NEARLY = 0.1  # of 1/condition: where a straight line from the last two looks le
 FORESEEN = 1e-3  # of 1/condition: from there on it is foreseen where it touches zero
 FINE = 40  # halvings towards the beginning of a step, where a number that has just changed its sign is next to nothing
 LARGE = 1e300  # for a number without bound
-SHRUNK = 3  # steps one after the other, each no longer than the last, from which it is looked for
 RUBBING = 20.0  # condition from which it is near where joints rub: their friction grows with it and costs more and more
 BESIDE = 0.25  # of the way that is left: poses there, on both sides, confirm the place
 
@@ -189,45 +189,26 @@ class Guards:
         return stretch._replace(state=state)
 
 
-@dataclass
-class DeadCentre:
-    """Watches the steps of one free coordinate for the dead centre of its joint, to see it before it is reached.
+def dead_centre(motion: FreeMotion, at: Moment, second: float) -> tuple[float, float] | None:
+    """Where the one free coordinate turns round at the dead centre of its joint: the time until then, s, and its place;
+    None if it does not.
 
     There the links go on while the driven coordinate q turns round, q* − q ~ (t* − t)²: the inertia reduced to it grows
     without bound, and the links cannot be assembled beyond. Steps shrink in proportion to t* − t and would never
     arrive. The place is foreseen from the last step, t* = t − q̇/q̈ and q* = q − q̇²/(2 q̈), and confirmed by poses on
-    both sides.
+    both sides. second: q̈; at: of one lane.
     """
-
-    motion: FreeMotion
-    layout: Layout
-    shrunk: int = 0
-    last: float = np.inf
-
-    def reached(self, solver: Any, size: float) -> tuple[float, dict[str, float]] | None:
-        """Time, s, and place of a dead centre that the steps run into, if they are near; size: of the last step, s."""
-        self.shrunk, self.last = (self.shrunk + 1 if size <= self.last else 0), size
-        n = self.layout.coordinates
-        if self.motion.several or not hasattr(solver, "f"):
-            return None
-        row, speed, second = solver.y, float(solver.y[n]), float(solver.f[n])
-        if self.shrunk < SHRUNK or not speed * second < 0.0:
-            return None
-        left, duration = -speed / second, -0.5 * speed * speed / second
-        near_rows = np.array(
-            [float(row[0]), float(row[0]) + (1 - BESIDE) * duration, float(row[0]) + (1 + BESIDE) * duration]
-        )
-        rows = np.repeat(np.asarray(row, float)[:, None], 3, axis=1)
-        rows[0] = near_rows
-        at = self.layout.moment(np.full(3, float(solver.t)), rows)
-        with np.errstate(all="ignore"):
-            walk = self.motion.walk(at, np.zeros_like(at.q))
-            nearest = NEAR_SINGULAR if self.motion.affine else RUBBING
-            near = np.broadcast_to(walk.condition, (3,))[0] > nearest
-            status = pose_status(walk, (3,))
-        if not near or status[1] == Status.NOT_ASSEMBLED or status[2] != Status.NOT_ASSEMBLED:
-            return None
-        return float(solver.t) + left, {"coordinate": float(row[0]) + duration, "rate": 0.0}
+    speed, q = single(at.rate[0]), single(at.q[0])
+    if not speed * second < 0.0:
+        return None
+    left = -0.5 * speed * speed / second
+    near_by = repeated(at, 3)._replace(q=np.array([[q, q + (1 - BESIDE) * left, q + (1 + BESIDE) * left]]))
+    with np.errstate(all="ignore"):
+        walk = motion.walk(near_by, np.zeros((1, 3)))
+        near = np.broadcast_to(walk.condition, (3,))[0] > (NEAR_SINGULAR if motion.affine else RUBBING)
+        status = pose_status(walk, (3,))
+    ends = near and status[1] != Status.NOT_ASSEMBLED and status[2] == Status.NOT_ASSEMBLED
+    return (-speed / second, q + left) if ends else None
 
 
 def _root(stretch: Stretch, number: int, level: float, low: float, high: float) -> float:

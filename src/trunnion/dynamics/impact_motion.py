@@ -154,7 +154,6 @@ class ImpactMotion(ActiveMotion):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.rows = 2 * self.count
         each = self.motion.contacts
         self.friction = np.array([contact.coefficient for contact in each])
         self.restitution = np.array([contact.restitution for contact in each])

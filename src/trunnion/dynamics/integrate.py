@@ -24,7 +24,7 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
+from trunnion.dynamics.guards import Crossing, Guards, dead_centre, first_crossing
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
 from trunnion.dynamics.start import Places
@@ -45,6 +45,7 @@ SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one 
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
 LOOKS, SCANNED = 12, 200  # times within a step, and within a rest, at which one looks for what changes
+SHRUNK = 4  # steps, each no longer than the last, from which a dead centre is looked for
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 NEAR = 1e-8  # of the coordinate: places that are one
 PAST = 1e-6  # of a step: by how much one that is taken anew goes past the place at which it is to end
@@ -243,10 +244,7 @@ class Integration(ABC):
         rate, absolute, marks = self._rate(), self._absolute(row), [time]
         stays = self.motion.stays(self.moment(time, row))
         first = until - time if stays else min(self.step, until - time)
-        solver, dead_centre = (
-            self._solver(rate, time, row, until, absolute, first),
-            DeadCentre(self.motion, self.layout),
-        )
+        solver = self._solver(rate, time, row, until, absolute, first)
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
             marks.append(before)
@@ -267,10 +265,19 @@ class Integration(ABC):
             self._follow(end, np.array(solver.y))
             self._end_step(solver, np.array(solver.y))
             self._compare(before, row)
-            if event := dead_centre.reached(solver, end - before):
-                self._turns_round(*event)
+            if self._reaches_dead_centre(solver, np.diff([*marks[-SHRUNK:], end])):
                 break
         return float(solver.t), np.array(solver.y)
+
+    def _reaches_dead_centre(self, solver: OdeSolver, sizes: Array) -> bool:
+        """End the motion at a dead centre that steps, each no longer than the last, run into; sizes: of the last, s."""
+        if self.motion.several or not isinstance(solver, DOP853) or len(sizes) < SHRUNK or np.any(np.diff(sizes) > 0.0):
+            return False
+        time, row = float(solver.t), np.array(solver.y)
+        place = dead_centre(self.motion, self.moment(time, row), float(solver.f[self.layout.coordinates]))
+        if place is not None:
+            self._turns_round(time + place[0], {"coordinate": place[1], "rate": 0.0})
+        return place is not None
 
     def _foreseen(self, row: Array, second: float) -> float:
         """Time, s, until one free coordinate comes to a bend or to rest, as its acceleration has it."""

@@ -32,7 +32,7 @@ from trunnion.solve.walk_kernel import literals
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = ["Codes", "CompiledRates", "compilable", "rates_of"]
+__all__ = ["Codes", "CompiledRates", "rates_of"]
 
 Array = NDArray[np.float64]
 
@@ -46,12 +46,7 @@ Codes = dict[tuple[Any, ...], "Code | None"]
 
 def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> Dynamics:
     """The rates of a motion: by machine code where they may be, else by walks. codes, varied: see `CompiledRates`."""
-    return bridged(motion, CompiledRates(motion, codes, varied) if compilable(motion) else Walks(motion))
-
-
-def compilable(motion: FreeMotion) -> bool:
-    """Whether its rates may be machine code: without an assembly that is followed."""
-    return not motion.followed
+    return bridged(motion, CompiledRates(motion, codes, varied))
 
 
 class CompiledRates:
@@ -85,11 +80,6 @@ class CompiledRates:
         numbers = self._numbers("rates", at)
         return self.walks.seconds(at) if numbers is None else numbers[: self.layout.coordinates]
 
-    def margins(self, at: Moment) -> Array:
-        """See `rates.Dynamics`."""
-        numbers = self._numbers("margins", at)
-        return self.walks.margins(at) if numbers is None else numbers
-
     def look(self, at: Moment) -> Seen:
         """See `rates.Dynamics`."""
         closed = any(isinstance(onset, Closed) for onset in at.onsets)
@@ -105,30 +95,28 @@ class CompiledRates:
         return None if numbers is None or np.any(numbers[-1]) else numbers[:-1]
 
     def _program(self, what: str, at: Moment) -> Program | None:
-        """The program; None while a joint sticks, where a contact of rigid bodies is closed beside friction, and where
-        something cannot be recorded."""
+        """The program; None where an assembly is followed, while a joint sticks, where a contact of rigid bodies is
+        closed beside friction, and where something cannot be recorded."""
         asked = what, at.onsets, at.now, at.senses, at.slips
-        if asked != self._asked[0]:  # some hundred thousand times it is the last one again
-            self._asked = asked, self._program_of(what, at)
-        return self._asked[1]
-
-    def _program_of(self, what: str, at: Moment) -> Program | None:
-        """See `_program`."""
+        if asked == self._asked[0]:  # some hundred thousand times it is the last one again
+            return self._asked[1]
+        motion, program = self.motion, None
         touching = tuple(onset if isinstance(onset, Closed) else onset is not None for onset in at.onsets)
         closed = any(isinstance(onset, Closed) for onset in at.onsets)
         senses = at.senses if what == "rates" else ()
-        if 0 in senses or (closed and not self.motion.affine):
-            return None
-        senses = senses if self.motion.several else ()
-        switches = tuple(drive.switches(at.now) for drive in self.motion.drives.values())
-        key = what, touching, switches, senses, at.slips
-        if key not in self._programs:
-            key_of_all = *key, self.motion.affine, bool(self.motion.resisted), *self.constant.items()
-            if key_of_all not in self.codes:
-                self.codes[key_of_all] = _code(self.motion, what, touching, switches, senses, at.slips, self.constant)
-            code = self.codes[key_of_all]
-            self._programs[key] = None if code is None else Program(self.motion, code)
-        return self._programs[key]
+        if not (motion.followed or 0 in senses or (closed and not motion.affine)):
+            senses = senses if motion.several else ()
+            switches = tuple(drive.switches(at.now) for drive in motion.drives.values())
+            key = what, touching, switches, senses, at.slips
+            if key not in self._programs:
+                key_of_all = *key, motion.affine, bool(motion.resisted), *self.constant.items()
+                if key_of_all not in self.codes:
+                    self.codes[key_of_all] = _code(motion, *key, self.constant)
+                code = self.codes[key_of_all]
+                self._programs[key] = None if code is None else Program(motion, code)
+            program = self._programs[key]
+        self._asked = asked, program
+        return program
 
 
 class Code(NamedTuple):
@@ -151,8 +139,8 @@ def _code(
 ) -> Code | None:  # fmt: skip
     """Record some numbers of a motion, and compile what is recorded; None where something cannot be recorded.
 
-    what: the rates, how near assemblies are to each other, or how the contacts are; touching: of every contact whether
-    it touches, or how it is closed; constant: numbers that are compiled in.
+    what: the rates, or a look at the contacts; touching: of every contact whether it touches, or how it is closed;
+    constant: numbers that are compiled in.
     """
     from trunnion.engines.graph import POSITION, Graph
     from trunnion.engines.machine_code import MachineCode, vector_width
@@ -172,12 +160,12 @@ def _code(
     q, rate, integral, bristles = cast("Any", (state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]))
     begun = tuple(each if isinstance(each, Closed) else approach.get(k) for k, each in enumerate(touching))
     at = Moment(cast("Any", time), q, rate, integral, bristles, slip, onsets=begun, senses=senses, slips=slips)
-    figures = {"rates": _rates_of, "margins": _margins, "look": _seen}[what]
     if motion.resisted and not motion.several:  # where a speed is lost in rounding, the sense is known still
         at = at._replace(senses=(cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)),))
     try:
         with np.errstate(all="ignore"):
-            numbers = figures(_recorded(motion, {**constant, **recorded}, switches), at)
+            of = _recorded(motion, {**constant, **recorded}, switches)
+            numbers = _rates_of(of, at) if what == "rates" else [*_seen(of, at), 0.0]
     except UntraceableError:
         return None
     *outputs_asked, doubt = [graph.as_float(number_of(graph, number)) for number in numbers]
@@ -263,7 +251,7 @@ def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
     back = motion.solve(at, cast("Any", second), motion.senses(at), sliding=True)
     for settled in back.settled:
         doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
-    contacts = _seen(motion, at)[:-1] if any(isinstance(onset, Closed) for onset in at.onsets) else []
+    contacts = _seen(motion, at) if any(isinstance(onset, Closed) for onset in at.onsets) else []
     return [*second, *beside(motion, at, second, back), *contacts, doubt]
 
 
@@ -339,13 +327,7 @@ def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) ->
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     """What `rates.Seen` has, of every contact."""
     nothing: Any = [0.0] * len(motion.names)
-    return [*itertools.chain(*seen(motion, motion.walk(at, nothing), at.onsets)), 0.0]
-
-
-def _margins(motion: FreeMotion, at: Moment) -> list[Number]:
-    """What `FreeMotion.margins` has."""
-    nothing: Any = [0.0] * len(motion.names)
-    return [*motion.margins(motion.walk(at, nothing)), 0.0]
+    return [*itertools.chain(*seen(motion, motion.walk(at, nothing), at.onsets))]
 
 
 def _eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], list[Number]]:

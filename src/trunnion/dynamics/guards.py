@@ -83,15 +83,13 @@ def _far_side(value: Callable[[float], float], low: float, high: float) -> float
 class Guards:
     """Looks at the steps of one motion.
 
-    limits: by driver the coordinates between which it may move; margins: tells 1/condition of the modules of
-    `FreeMotion.meeting`, (module, lane); passed: times of change points through which it goes on, s, until they are
-    taken down; last: that of the last one.
+    limits: by driver the coordinates between which it may move; passed: times of change points through which it goes
+    on, s, until they are taken down; last: that of the last one.
     """
 
     motion: FreeMotion
     layout: Layout
     limits: Mapping[str, tuple[float, float]]
-    margins: Callable[[Moment], Array]
     passed: list[float] = field(default_factory=list)
     last: float = -np.inf
 
@@ -147,7 +145,11 @@ class Guards:
 
         def margins(moments: Array) -> Array:
             rows = np.where(moments < stretch.begin, last.state(moments), onward.state(moments))
-            return self.margins(self.layout.moment(moments, rows))
+            with np.errstate(all="ignore"):
+                walk = self.motion.walk(
+                    self.layout.moment(moments, rows), np.zeros((self.layout.coordinates, len(moments)))
+                )
+                return np.array([np.broadcast_to(each, moments.shape) for each in self.motion.margins(walk)])
 
         looks, spans = margins(times), np.diff(times)
         ahead = looks[:, 1:-1] + (looks[:, 1:-1] - looks[:, :-2]) * spans[1:] / spans[:-1]

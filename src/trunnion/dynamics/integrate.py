@@ -101,7 +101,7 @@ class Integration(ABC):
         self.mode = self.mode._replace(now=0.5 * (self.start + self.breaks[0]))
         self.ends = np.array([self.places.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         self._walked = self.motion.walked[0]
-        self.guards = Guards(self.motion, self.layout, self.places.limits, self.dynamics.margins)
+        self.guards = Guards(self.motion, self.layout, self.places.limits)
 
     # ---- the whole way ----------------------------------------------------------------------------------------
 

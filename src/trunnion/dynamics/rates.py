@@ -69,15 +69,13 @@ class Seen(NamedTuple):
 
 class Dynamics(Protocol):
     """What tells how a motion goes on: the rates at one moment and, of many lanes, the accelerations, (coordinate,
-    lane), the contacts, and 1/condition of the modules of `FreeMotion.meeting`, (module, lane)."""
+    lane), and the contacts."""
 
     def __call__(self, at: Moment) -> Rates: ...
 
     def seconds(self, at: Moment) -> Array: ...
 
     def look(self, at: Moment) -> Seen: ...
-
-    def margins(self, at: Moment) -> Array: ...
 
 
 class Layout(NamedTuple):
@@ -149,12 +147,6 @@ class Walks:
     def seconds(self, at: Moment) -> Array:
         """See `Dynamics`."""
         return np.zeros_like(at.q) if self.motion.stays(at) else self.motion.accelerate(at).second
-
-    def margins(self, at: Moment) -> Array:
-        """See `Dynamics`."""
-        with np.errstate(all="ignore"):
-            walk = self.motion.walk(at, np.zeros_like(at.q))
-            return np.array([np.broadcast_to(margin, at.q.shape[1]) for margin in self.motion.margins(walk)])
 
     def look(self, at: Moment) -> Seen:
         """See `Dynamics`."""

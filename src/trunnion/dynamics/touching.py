@@ -23,10 +23,11 @@ from typing import Any, ClassVar, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra import plane
 from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
-from trunnion.algebra.space import ORIGIN, Frame, moment_at, slid
+from trunnion.algebra.space import ORIGIN, Frame, compose, moment_at, slid
 from trunnion.algebra.vector import Vector3, cross, dot, length, minus, plus, scaled
 from trunnion.joints.contact import elastic_force, hertz_stiffness, normal_force
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
@@ -112,6 +113,17 @@ class Contact(ABC):
     def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """Where the surfaces are. in_time: numbers are dual, with their derivatives by time; in the plane alone."""
 
+    def bodies(self, walk: Forward, in_time: bool = False) -> list[tuple[Any, Any]]:
+        """Frame and twist of the pin or slider, and of the hole or guide; in_time: see `state`."""
+        pairs = []
+        for link in (self.body, self.other):
+            frame, twist, second = (each(part, primal) for part in walk.motions[link])
+            if in_time:
+                speeds = *plane.velocity_at(twist, (frame.x, frame.y)), -twist.w * frame.s, twist.w * frame.c
+                frame, twist = plane.Frame(*map(Dual, frame, speeds)), plane.Twist(*map(Dual, twist, second))
+            pairs.append((frame, twist))
+        return pairs
+
     def accelerations(self, walk: Forward) -> tuple[Array, Array]:
         """Second derivative of the gap, and derivative of the slip, m/s²."""
         state = self.state(walk, in_time=True)
@@ -170,25 +182,19 @@ class PinContact(Contact):
 
     def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is ρ − |c|."""
-        a, b = (_point(walk, *at, in_time) for at in ((self.body, self.pin), (self.other, self.hole)))
-        cx, cy = a[0] - b[0], a[1] - b[1]
+        (body, moving), (other, still) = self.bodies(walk, in_time)
+        centre = plane.point_of(other, self.hole)
+        cx, cy = _minus(plane.point_of(body, self.pin), centre)
         xp = namespace(cx, cy)
         size = xp.hypot(cx, cy)
         off_centre = size > CENTRED * self.clearance
         over = xp.where(off_centre, size, 1.0)
         nx, ny = xp.where(off_centre, cx / over, 1.0), xp.where(off_centre, cy / over, 0.0)
-        ux, uy = a[2] - b[2], a[3] - b[3]
-        tx, ty = -ny, nx
-        px, py = b[0] + self.wall * nx, b[1] + self.wall * ny
-        pin, hole = (_spin(walk, link, in_time) for link in (self.body, self.other))
-        # velocities of both materials where they touch, along the tangent
-        slip = (
-            (a[2] * tx + a[3] * ty + pin * ((px - a[0]) * nx + (py - a[1]) * ny))
-            - (b[2] * tx + b[3] * ty + hole * ((px - b[0]) * nx + (py - b[1]) * ny))
-        )  # fmt: skip
-        frame = walk.motions[self.other].frame
-        offset = frame.c * cx + frame.s * cy, frame.c * cy - frame.s * cx
-        return ContactState(self.clearance - size, -(nx * ux + ny * uy), slip, (nx, ny), (tx, ty), (px, py), offset)
+        place = centre[0] + self.wall * nx, centre[1] + self.wall * ny
+        vx, vy = _minus(plane.velocity_at(moving, place), plane.velocity_at(still, place))
+        offset = other.c * cx + other.s * cy, other.c * cy - other.s * cx
+        rate, slip = -(nx * vx + ny * vy), nx * vy - ny * vx
+        return ContactState(self.clearance - size, rate, slip, (nx, ny), (-ny, nx), place, offset)
 
 
 @dataclass(frozen=True)
@@ -211,33 +217,22 @@ class EdgeContact(Contact):
 
     def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is the distance of the wall less that of the corner, on its side of the middle."""
-        x, y, c, s = self.line
-        a, o = (_point(walk, *at, in_time) for at in ((self.body, self.corner), (self.other, (x, y))))
-        spin = _spin(walk, self.other, in_time)
-        tx, ty = (primal(part) for part in walk.algebra.rotated(walk.motions[self.other].frame, (c, s)))
-        if in_time:
-            tx, ty = Dual(tx, -primal(spin) * ty), Dual(ty, primal(spin) * tx)
-        nx, ny, rx, ry = -self.side * ty, self.side * tx, a[0] - o[0], a[1] - o[1]
+        (body, moving), (other, still) = self.bodies(walk, in_time)
+        corner, (tx, ty) = plane.point_of(body, self.corner), plane.rotated(other, self.line[2:])
+        rx, ry = _minus(corner, plane.point_of(other, self.line[:2]))
+        vx, vy = _minus(plane.velocity_at(moving, corner), plane.velocity_at(still, corner))
+        nx, ny = -self.side * ty, self.side * tx
         away = rx * nx + ry * ny
-        vx, vy = a[2] - (o[2] - spin * ry), a[3] - (o[3] + spin * rx)
         nil = 0.0 * away
         return ContactState(
             self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + nil, ny + nil), (tx + nil, ty + nil),
-            (a[0], a[1]), (rx * tx + ry * ty, self.side * away),
+            corner, (rx * tx + ry * ty, self.side * away),
         )  # fmt: skip
 
 
-def _point(walk: Forward, link: str, local: tuple[float, float], in_time: bool) -> tuple[Number, ...]:
-    """Place, m, and velocity, m/s, of a point of a link; in time with their derivatives."""
-    at = walk.at(link, local)
-    x, y, vx, vy, ax, ay = (primal(part) for vector in at for part in vector[:2])
-    return (Dual(x, vx), Dual(y, vy), Dual(vx, ax), Dual(vy, ay)) if in_time else (x, y, vx, vy)
-
-
-def _spin(walk: Forward, link: str, in_time: bool) -> Number:
-    """Angular velocity of a link, rad/s; in time with its derivative."""
-    spin, change = primal(walk.motions[link].twist.w), walk.motions[link].acceleration.w
-    return Dual(spin, primal(change)) if in_time else spin
+def _minus(a: Any, b: Any) -> Any:
+    """The difference of two vectors."""
+    return tuple(first - second for first, second in zip(a, b, strict=True))
 
 
 @dataclass(frozen=True)
@@ -247,19 +242,6 @@ class SpatialContact(Contact):
 
     axle: Frame = ORIGIN
     hole: Frame = ORIGIN
-
-    def _axes(self, walk: Forward) -> tuple[Frame, Frame]:
-        """Global frames of pin and hole."""
-        pairs_of_axes = []
-        for link, local in ((self.body, self.axle), (self.other, self.hole)):
-            frame = walk.motions[link].frame
-            pairs_of_axes.append(each(walk.algebra.compose(frame, local), primal))
-        return pairs_of_axes[0], pairs_of_axes[1]
-
-    def _speed(self, walk: Forward, place: Vector3) -> Vector3:
-        """Velocity of the pin against the hole, of their materials at a place, m/s."""
-        pin, hole = (each(moment_at(walk.motions[link].twist, place), primal) for link in (self.body, self.other))
-        return minus(pin, hole)
 
 
 @dataclass(frozen=True)
@@ -271,7 +253,8 @@ class DiscContact(SpatialContact):
 
     def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is ρ − |c|, c from the centre of the hole's end to the pin's axis at right angles to that."""
-        pin, end = self._axes(walk)
+        (body, moving), (other, still) = self.bodies(walk)
+        pin, end = compose(body, self.axle), compose(other, self.hole)
         apart = minus(pin.place, end.place)
         c = minus(apart, scaled(dot(apart, pin.z), pin.z))
         size = length(c)
@@ -284,7 +267,7 @@ class DiscContact(SpatialContact):
             xp.where(off_centre, part * over, other * share) for part, other in zip(c, upright, strict=True)
         ))  # fmt: skip
         place = plus(end.place, scaled(self.wall, normal))
-        speed = self._speed(walk, place)
+        speed = minus(moment_at(moving, place), moment_at(still, place))
         away = dot(speed, normal)
         sliding = minus(speed, scaled(away, normal))
         slip = length(sliding)
@@ -303,9 +286,10 @@ class ShoulderContact(SpatialContact):
 
     def state(self, walk: Forward, in_time: bool = False) -> ContactState:
         """The gap is half the end float less how far the pin has come along the hole's axis, to this side."""
-        pin, middle = self._axes(walk)
+        (body, moving), (other, still) = self.bodies(walk)
+        pin, middle = compose(body, self.axle), compose(other, self.hole)
         apart, normal = minus(pin.place, middle.place), scaled(self.side, middle.z)
-        speed = self._speed(walk, pin.place)
+        speed = minus(moment_at(moving, pin.place), moment_at(still, pin.place))
         nothing = 0.0 * dot(apart, normal)
         offset = tuple(dot(apart, axis) for axis in (middle.x, middle.y, middle.z))
         tangent = tuple(part + nothing for part in middle.x)

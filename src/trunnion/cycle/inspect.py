@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.findings import Cycle, findings
-from trunnion.cycle.model_findings import shared_dimensions
+from trunnion.cycle.findings import Cycle, findings, shared_dimensions
 from trunnion.cycle.positions import positions
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import named

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from trunnion.cycle.analyse import analyse_run
 from trunnion.cycle.locking_course import (
@@ -13,11 +14,13 @@ from trunnion.cycle.locking_course import (
     NEAR,
     LockingRange,
     LockingState,
+    critical_multiples,
     holding_multiples,
     locking_course,
     multiples_at,
     passed,
 )  # fmt: skip
+from trunnion.cycle.positions import positions
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
 from trunnion.errors import Finding, MechanismError, Status
@@ -30,14 +33,18 @@ from trunnion.results.variables import LOCKING, along_positions
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.system import rubbing
+from trunnion.solve.seating import seating_of
+from trunnion.solve.system import Values, felt, rubbing, scale_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "HELD_AND_DRIVEN", "MOST_STEPS", "NEAR", "LockingRange", "LockingState", "locking", "look", "report_figures",
+    "HELD_AND_DRIVEN", "MOST_STEPS", "NEAR", "LockingRange", "LockingState", "locking", "locks_of", "look",
+    "margins_without", "report_figures",
 ]  # fmt: skip
+
+Array = NDArray[np.float64]
 
 MOST_STEPS = 8192
 METHOD = FrictionMethod(margin_up_to=MARGIN)
@@ -123,3 +130,63 @@ def report_figures(run: Run) -> list[Figure]:
         course.reverse_figure() or none,
     ]
     return scales_of(run).of_figures([figure for figure in figures if figure is not None])
+
+
+# ---- which joints lock, and what each group has to do with the margin ----------------------------------------
+
+
+@np.errstate(all="ignore")
+def locks_of(run: Run, time: Array, status: ArrayLike, values: Values | None = None) -> dict[str, Array]:
+    """Joints that lock at some of the times, with the multiple of the friction at which they do; NaN where they do not.
+
+    It is the joint whose own friction need be lowered the least, and the multiple is of that alone. Where no joint
+    alone can be lowered enough, it is every joint of the group, and the multiple is of all of them.
+
+    Parameters
+    ----------
+    run : Run
+    time : array
+        s.
+    status : array
+        That of the run at each of them.
+    values : mapping, optional
+        Other numbers than those of the run, SI, by path.
+    """
+    lanes = np.flatnonzero(np.asarray(status) == Status.LOCKED)
+    if not len(lanes):
+        return {}
+    method = FrictionMethod(name="newton")
+    seated = run.seats and values is None
+    back = seating_of(run, method).at(time[lanes], method).back if seated else run.solve(time[lanes], values, method)
+    multiples = critical_multiples(back, 1.0)
+    if not multiples:
+        return {}
+    alone = np.array([np.where(multiple < 1.0, multiple, 0.0) for multiple in multiples.values()])
+    columns = {joint: np.full(len(time), np.nan) for joint in multiples}
+    best = np.argmax(alone, axis=0)
+    for number, settled in zip(reversed(range(len(run.system.plan.modules))), back.settled, strict=True):
+        share = np.broadcast_to(np.asarray(settled.share, float), len(lanes))
+        for joint in multiples.keys() & set(run.system.plan.modules[number].joints):
+            row = list(multiples).index(joint)
+            decides = (best == row) & (alone[row] > 0)
+            together = (share < 1.0) & ~(np.max(alone, axis=0) > 0)
+            columns[joint][lanes] = np.where(decides, alone[row], np.where(together, share, np.nan))
+    return {joint: column for joint, column in columns.items() if np.any(np.isfinite(column))}
+
+
+def margins_without(run: Run, steps: int) -> list[Array | None]:
+    """For each group of the plan the locking margin over the cycle without the friction of its joints; None where a law
+    has no number that takes it away.
+    """
+    modules, mechanism = run.system.plan.modules, run.system.mechanism
+    rubs, margins = felt(run.system, run.values), list[Array | None]()
+    for module in modules:
+        scales = {joint: scale_of(run.system, run.values, joint) for joint in module.joints if joint in rubs}
+        if not all(scales.values()):
+            margins.append(None)
+            continue
+        quiet = mechanism.with_values({f"joints.{joint}.friction.{scale}": 0.0 for joint, scale in scales.items()})
+        with np.errstate(all="ignore"):
+            margin = positions(prepare(quiet), steps, averaged=False).arrays["locking_margin"]
+        margins.append(np.minimum(margin, MARGIN))
+    return margins

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle import contact_loss, resting_joints
+from trunnion.cycle import resting_joints
 from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, Means, course_of, unknown
 from trunnion.cycle.cycle_kernel import compiles, kernel_of
@@ -20,17 +20,20 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
+from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.margin import least_beside, margin_in
-from trunnion.solve.memory import blocks
+from trunnion.solve.memory import CHUNK, blocks
 from trunnion.solve.run import Run
-from trunnion.solve.seating import SETTLED, seating_of
+from trunnion.solve.seating import SETTLED, UNSETTLED, Seating, seating_of
 from trunnion.solve.system import Dial, System
 
 __all__ = ["ALL", "Arrays", "Dtype", "Kept", "Positions", "check_steps", "positions", "stretch"]
 
 
+Array = NDArray[np.float64]
 Dtype = Literal["float64", "float32"]
+INSIDE = 1e-9  # of the cycle: positions at the ends of a time belong to it
 # what summary and findings are made of
 BOOKS = {
     "condition", "drive_effort", "drive_power", "friction_iterations", "friction_power", "joint_slide",
@@ -99,7 +102,7 @@ class Positions:
 
     arrays: Arrays
     labels: dict[str, list[str]]
-    time: NDArray[np.float64]
+    time: Array
     dial: Dial
     method: FrictionMethod
     causes: Causes
@@ -145,7 +148,7 @@ def over_cycle(run: Run, result: Positions) -> Positions:
 
 def stretch(
     run: Run,
-    time: NDArray[np.float64],
+    time: Array,
     method: FrictionMethod,
     engine: str = "auto",
     variables: Collection[str] | None = None,
@@ -170,7 +173,7 @@ def stretch(
         least = least_beside(partial(margin_in, most=method.margin_up_to), solve, time[places], run.cycle)
         arrays["locking_margin"][places] = np.where(np.isnan(least), arrays["locking_margin"][places], least)
     if seating:
-        contact_loss.find(arrays, seating, time)
+        _lose_contact(arrays, seating, time)
     unwrap(arrays, run.system, run.values, time)
     means = unknown(len(run.system.mechanism.drivers), len(run.system.joints))
     dial = run.system.dial(run.values, time)
@@ -188,9 +191,7 @@ def _refuse_seats(run: Run) -> None:
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
-def _fill(
-    arrays: Arrays, run: Run, time: NDArray[np.float64], window: slice, method: FrictionMethod, causes: Causes
-) -> None:
+def _fill(arrays: Arrays, run: Run, time: Array, window: slice, method: FrictionMethod, causes: Causes) -> None:
     """One chunk of positions; of a mechanism with errors beside the ideal one."""
     seating = seating_of(run, method) if run.seats else None
     seated = seating.at(time, method) if seating else None
@@ -207,9 +208,7 @@ def _fill(
         fill_errors(arrays, meant, run.system, window)
 
 
-def _compiled(
-    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: Causes, engine: str
-) -> bool:
+def _compiled(arrays: Arrays, run: Run, time: Array, method: FrictionMethod, causes: Causes, engine: str) -> bool:
     """All positions by the compiled engine; False where that cannot, of the engine auto."""
     kernel = kernel_of(run, engine, run.values, time, arrays, method)
     if kernel is None:
@@ -222,3 +221,58 @@ def _compiled(
         ideal.fill(meant, run.ideal_values, time)
         fill_errors(arrays, meant, run.system, slice(0, len(time)))
     return True
+
+
+# ---- where pins lose contact -------------------------------------------------------------------------------------
+
+
+def _lose_contact(arrays: Arrays, seating: Seating, time: Array) -> None:
+    """Write the losses of contact of joints that their loads seat into `contact_lost`, the status and the numbers.
+
+    The massless-link model of play keeps the pin at the wall of its hole. That ends where the load vanishes or turns
+    round, which the courses of the loads without play say whatever the positions are; where the load of a pin that
+    travels points away from its wall; and where a seat does not settle, since there the load changes more by the seat
+    than it presses.
+    """
+    run, loads, status = seating.run, seating.loads, arrays["status"]
+    for first in range(0, len(time), CHUNK):
+        window = slice(first, min(first + CHUNK, len(time)))
+        _fill_numbers(arrays["contact_loss_number"][:, window], loads, time[window])
+    joints, duration, lost = list(run.system.joints), run.cycle.duration, arrays["contact_lost"]
+    step = time[1] - time[0] if len(time) > 1 else 0.0
+    for halt in seating.halts:
+        lost[joints.index(halt.joint), (halt.low <= time) & (time < halt.high)] = 1
+    times = [(cross.end, cross.low, cross.time, cross.high) for cross in loads.passages]
+    for end, low, middle, high in times + [(end, low, low, high) for end, low, high in loads.idle]:
+        row, away = joints.index(end.seat.joint), np.abs(time - middle)
+        away = np.minimum(away, duration - away) if run.cycle.periodic else away
+        lost[row, (time >= low - INSIDE * duration) & (time <= high + INSIDE * duration)] = 1
+        if np.min(away) <= (0.5 + INSIDE) * step:  # the position next to it, if it lies between two
+            lost[row, np.argmin(away)] = 1
+    late = np.flatnonzero((seating.states(time) == UNSETTLED) & (status != Status.ZERO_SLIP))
+    if len(late):  # of the joint whose end bears least
+        rows = [joints.index(seat.joint) for seat in run.seats if seat.given is None]
+        sizes = np.sqrt(np.sum(arrays["end_force"][rows][..., late] ** 2, axis=2))
+        least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
+        lost[np.array(rows)[least], late] = 1
+    lost[:, status >= Status.NOT_CONVERGED] = 0
+    anywhere = np.any(lost > 0, axis=0)
+    np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
+
+
+def _fill_numbers(numbers: Array, loads: EndLoads, time: Array) -> None:
+    """|F × Ḟ|/|F|³, rad/(N s), of every joint: of its reaction without play, in space of the force on an end.
+
+    S. W. E. Earles and C. L. S. Wu (Predicting the occurrence of contact loss and impact at a bearing from a
+    zero-clearance analysis, Proc. 4th World Congress on the Theory of Machines and Mechanisms, 1975, 1013-1018) found
+    it to tell impact from about 1 rad/(N s) on. It is empirical, and has a unit.
+    """
+    forces, rates = loads.courses.at(time), loads.rates.at(time)
+    for number, vectors in zip(numbers, loads.vectors, strict=True):
+        for rows in vectors:
+            force, rate = forces[rows], rates[rows]
+            square = np.sum(force * force, axis=0)
+            with np.errstate(all="ignore"):
+                across = np.linalg.norm(rate - force * (np.sum(force * rate, axis=0) / square), axis=0)
+                pressed = np.sqrt(square) > NO_LOAD * loads.largest
+                number[...] = np.fmax(number, np.where(pressed, across / square, np.nan))

@@ -243,8 +243,7 @@ def undefined(time: Array, status: NDArray[Any]) -> Iterator[Finding]:
 def _end(ended: Ended, driver: str, unit: str) -> Finding:
     """Why a motion ended before its time. driver: the one concerned; unit: of its coordinate."""
     at, own = readable(ended.time, "s"), ended.figures
-    place = f"coordinate {own['coordinate']:.6g}" if "coordinate" in own else ""
-    state = f"{place}, rate {own['rate']:.6g}" if "rate" in own else place
+    state = ", ".join(f"{key} {own[key]:.6g}" for key in ("coordinate", "rate") if key in own)
     where, figures = f"drivers.{driver}", {**own, "driver": driver, "unit": unit, "time": ended.time}
     forces = "check the forces there: one of them has no value, jumps, or grows without bound"
     dead = "limit the motion by a stop or a load, or drive a joint that has no dead centre there"
@@ -270,7 +269,7 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
             what += f"assembled beyond it, and go on as {driver} reverses"
             return Finding.error("simulate.dead_centre", where, what, dead, **figures)
         case "not_assembled":
-            what = f"the links cannot be assembled beyond {at} ({place})"
+            what = f"the links cannot be assembled beyond {at} ({state})"
             return Finding.error("simulate.not_assembled", where, what, dead, **figures)
         case "events":
             what = f"there are {own['count']:.0f} events up to {at}: the motion is not followed farther"
@@ -283,8 +282,7 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
             return Finding.error("simulate.change_point", where, what, remedy, **figures)
         case "evaluations":
             what = f"{own['count']:,} evaluations of the forces are used up at {at} of {readable(own['of'], 's')}"
-            remedy = "look for a stiff spring, damper or contact on a small mass; ask for a shorter --time or more "
-            remedy += "--evaluations"
+            remedy = "look for a stiff spring, damper or contact on a small mass; ask for more --evaluations"
             return Finding.error("simulate.evaluations", where, what, remedy, **figures)
         case _:
             what = f"there are no forces or impulses of the contacts that touch at {at} ({state}) under which nothing "

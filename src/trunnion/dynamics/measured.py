@@ -6,7 +6,6 @@ They have no course over a cycle. Of dual numbers the derivatives are central di
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +30,7 @@ Array = NDArray[np.float64]
 
 LONGER = "state a longer duration of the measure in the model; `trunnion simulate` with these values shows the motion"
 TOLERANCE = 1e-10  # of the steps, relative: figures to 1e-7 and better, a coordinate being many turns
-FEW, KEPT = 256, 64  # samples of which figures are kept, and how many of them
+FEW = 256  # samples of which figures are kept
 
 
 class MotionKernel(NumpyKernel):
@@ -103,13 +102,9 @@ def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, dura
     """`figures_in_time`; those of few samples are kept, as a search asks for the same ones measure by measure."""
     if count > FEW:
         return figures_in_time(run, driver, values, count, duration)
-    stored: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
     numbers = tuple((path, np.asarray(value, float).tobytes()) for path, value in values.items())
-    if (what := (driver, duration, count, numbers)) not in stored:
-        if len(stored) >= KEPT:
-            stored.clear()
-        stored[what] = figures_in_time(run, driver, values, count, duration)
-    return stored[what]
+    key = "figures in time", driver, duration, count, numbers
+    return run.once(key, lambda: figures_in_time(run, driver, values, count, duration))
 
 
 def _column(value: Number, count: int) -> Number:

@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import networkx as nx  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,11 +83,17 @@ def opened(run: Run) -> Opened:
         raise MechanismError(Finding(what, "drivers", "begin at another coordinate: initial: {coordinate: …}"))
     data = {key: part for key, part in mechanism.data().items() if key in KEPT}
     several = of_several(mechanism)
-    _leave_out(data, mechanism, [*cut, *several])
+    without = [*cut, *several]
+    paths = tuple(f"joints.{name}." for name in without)
+    data["joints"] = {name: entry for name, entry in data["joints"].items() if name not in without}
+    data["assembly"] = {name: entry for name, entry in data.get("assembly", {}).items() if name not in without}
+    errors = data.get("errors", {}).items()
+    data["errors"] = {name: entry for name, entry in errors if not mechanism.path_of(name).startswith(paths)}
+    data["links"] = {name: {**entry, "points": dict(entry["points"])} for name, entry in data["links"].items()}
     chains = {joint: _chain_of_joint(data, run, walk, joint) for joint in several}
     hung: Starts = {}
     for link in _loose(data, mechanism):
-        hung |= (_hang_in_space if run.system.spatial else _hang)(data, run, walk, link)
+        hung |= _hang(data, run, walk, link)
     base = Mechanism(**data)
     missing = mobility_by_formula(base) - len(passive(base)) - len(base.drivers) - len(hung)
     starts = {name: start for chain in chains.values() for name, start in chain.items()} | hung
@@ -97,16 +104,6 @@ def opened(run: Run) -> Opened:
         hung[name] = starts[name]
     data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, hung)}
     return Opened(Mechanism(**data), run, {joint: tuple(chain) for joint, chain in chains.items()})
-
-
-def _leave_out(data: dict[str, Any], mechanism: Mechanism, without: Sequence[str]) -> None:
-    """Take joints out of what a file says."""
-    paths = tuple(f"joints.{name}." for name in without)
-    data["joints"] = {name: entry for name, entry in data["joints"].items() if name not in without}
-    data["assembly"] = {name: entry for name, entry in data.get("assembly", {}).items() if name not in without}
-    errors = data.get("errors", {}).items()
-    data["errors"] = {name: entry for name, entry in errors if not mechanism.path_of(name).startswith(paths)}
-    data["links"] = {name: {**entry, "points": dict(entry["points"])} for name, entry in data["links"].items()}
 
 
 def _start(run: Run) -> Forward:
@@ -132,36 +129,26 @@ def of_several(mechanism: Mechanism) -> list[str]:
 
 def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
     """Joints on the shortest ways around the joints that are cut."""
-    edges = {name: joint.links for name, joint in mechanism.effective_joints.items() if name not in cut}
-    nearby = set[str]()
+    links, nearby = nx.Graph(), set[str]()
+    links.add_nodes_from(mechanism.effective_links)
+    for name, joint in mechanism.effective_joints.items():
+        if name not in cut:
+            links.add_edge(*joint.links, joint=name)
     for cut_joint in cut:
         first, last = mechanism.effective_joints[cut_joint].links
-        came, ahead = dict[str, tuple[str, str]](), [first]
-        for link in ahead:
-            for name, (one_end, other_end) in edges.items():
-                farther = other_end if link == one_end else one_end if link == other_end else first
-                if farther != first and farther not in came:
-                    came[farther] = name, link
-                    ahead.append(farther)
-        while last in came:
-            name, last = came[last]
-            nearby.add(name)
+        if nx.has_path(links, first, last):
+            nearby |= {links.edges[ends]["joint"] for ends in itertools.pairwise(nx.shortest_path(links, first, last))}
     return nearby
 
 
 def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
-    part, mass = {link: {link} for link in data["links"]}, mechanism.parameters()
-    for joint in data["joints"].values():
-        first, other = (part[link] for link in joint["links"])
-        if first is not other:
-            first |= other
-            part.update(dict.fromkeys(other, first))
-    loose = {id(links): links for links in part.values() if mechanism.fixed_link not in links}
-    return [
-        max((link for link in mechanism.links if link in links), key=lambda link: mass[f"links.{link}.mass"])
-        for links in loose.values()
-    ]
+    links, mass = nx.Graph(joint["links"] for joint in data["joints"].values()), mechanism.parameters()
+    links.add_nodes_from(data["links"])
+    parts = [part for part in nx.connected_components(links) if mechanism.fixed_link not in part]
+    loose = [max((link for link in mechanism.links if link in part), key=lambda link: mass[f"links.{link}.mass"])
+             for part in parts]  # fmt: skip
+    return sorted(loose, key=list(data["links"]).index)
 
 
 def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], run: Run) -> tuple[str, ...]:
@@ -234,7 +221,11 @@ def _chained(
 
 def _hang(data: dict[str, Any], run: Run, walk: Forward, link: str) -> Starts:
     """Connect a loose link with the ground by slides along x and y and a turn about its mass centre; beside it where a
-    joint is, for two that turn at one point move nothing."""
+    joint is, for two that turn at one point move nothing. In space by three slides of that centre and three turns."""
+    ground = run.system.mechanism.fixed_link
+    if run.system.spatial:
+        centre = walk.at(link, run.system.centre(walk.values, link)).place
+        return _counted(data, walk, link, (ground, link), "PPPRRR", _turning(run, walk, ground, link), centre)
     x, y = (single(part) for part in run.system.centre(walk.values, link))
     joints = [name for name, joint in data["joints"].items() if link in joint["links"]]
     if (x, y) in {tuple(single(walk.values[f"links.{link}.points.{name}.{axis}"]) for axis in "xy") for name in joints}:
@@ -243,15 +234,7 @@ def _hang(data: dict[str, Any], run: Run, walk: Forward, link: str) -> Starts:
     inside = [{"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}, [0, 0]]
     starts = [(single(place), single(speed)) for place, speed in zip(at.place[:2], at.velocity[:2], strict=True)]
     starts.append((float(np.arctan2(single(frame.s), single(frame.c))), single(twist.w)))
-    links = run.system.mechanism.fixed_link, link
-    return _chained(data, link, links, "PPR", (inside[0], [x, y]), inside, starts)
-
-
-def _hang_in_space(data: dict[str, Any], run: Run, walk: Forward, link: str) -> Starts:
-    """Connect a loose link with the ground by three slides of its mass centre and three turns."""
-    ground = run.system.mechanism.fixed_link
-    centre = walk.at(link, run.system.centre(walk.values, link)).place
-    return _counted(data, walk, link, (ground, link), "PPPRRR", _turning(run, walk, ground, link), centre)
+    return _chained(data, link, (ground, link), "PPR", (inside[0], [x, y]), inside, starts)
 
 
 def _chain_of_joint(data: dict[str, Any], run: Run, walk: Forward, joint: str) -> Starts:

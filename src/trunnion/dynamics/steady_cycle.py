@@ -23,7 +23,6 @@ from trunnion.cycle import summary
 from trunnion.cycle.positions import positions
 from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.findings import motion_findings
-from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.impact_motion import integration_of
 from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play
@@ -282,7 +281,8 @@ class Section:
         time, before = (course.when(max(at, 0.0)) for at in (passed, passed - span))
         self.way, self.takes = sense * span, time - before
         rows, which = solution.at(np.array([time]))
-        self.row, self.snapshot = rows[:, 0], self._from(solution.stretches[which[0]].snapshot, time)
+        self.row, snapshot = rows[:, 0], solution.stretches[which[0]].snapshot
+        self.snapshot = None if snapshot is None else replace(snapshot, time=snapshot.time - time)
         self.layout, names = Layout.of(motion), motion.names
         n, drives = self.layout.coordinates, enumerate(motion.drives.values())
         idle = [2 * n + i for i, drive in drives if not drive.controlled]
@@ -292,11 +292,6 @@ class Section:
         sizes = np.array([1.0 if motion.system.turns(name) else size for name in names])
         bristles = np.maximum(np.abs(self.row[3 * n : self.layout.slip]), 1e-6 * size)
         self.scale = np.concatenate([sizes, speed * sizes, speed * self.takes * sizes, bristles])[self.which]
-
-    @staticmethod
-    def _from(snapshot: Snapshot | None, time: float) -> Snapshot | None:
-        """A snapshot as it is for a motion that begins at a time, s."""
-        return None if snapshot is None else replace(snapshot, time=snapshot.time - time)
 
     def after(self, state: Array) -> tuple[Array, Solution] | None:
         """What one cycle after a state misses it by, P(x) − x, in parts of what is typical, and the motion; None where
@@ -327,9 +322,13 @@ class Section:
         """The state that comes back, from the last one of the run-up, with the eigenvalue that says what is left of a
         difference; None if it is not found."""
         state = self.row[self.which].copy()
-        passage = self.after(state)
+        speed, passage = self.which == self.layout.coordinates + self.first, self.after(state)
         for _ in range(ROUNDS):
-            if passage is None or (slopes := self._slopes(state, passage[0])) is None:
+            if passage is None:
+                return None
+            near_by = [self.after(state + nudge) for nudge in np.diag(NUDGE * self.scale)]
+            slopes = np.transpose([(other[0] - passage[0]) / NUDGE for other in near_by if other is not None])
+            if slopes.shape != (len(state), len(state)):  # a state near by does not come back
                 return None
             step = -np.linalg.lstsq(slopes, passage[0], rcond=None)[0]
             if np.max(np.abs(step)) <= SURE or np.max(np.abs(passage[0])) <= NOISE * self.tolerance:
@@ -340,7 +339,8 @@ class Section:
                 return SteadyCycle(passage[1], self.first, most, factor)
             for size in HALVED:
                 tried = state + size * step * self.scale
-                passage = self.after(tried) if self._near(tried) else None
+                share = tried[speed][0] / self.row[self.which][speed][0]
+                passage = self.after(tried) if 1 / FAR < share < FAR else None
                 if passage is None:
                     continue
                 simplified = np.linalg.lstsq(slopes, passage[0], rcond=None)[0]
@@ -348,19 +348,3 @@ class Section:
                     break
             state = tried
         return None
-
-    def _slopes(self, state: Array, miss: Array) -> Array | None:
-        """∂(P − x)/∂x by differences, in parts of what is typical; None where a state near by does not come back."""
-        slopes = np.empty((len(state), len(state)))
-        for k, nudge in enumerate(np.diag(NUDGE * self.scale)):
-            other = self.after(state + nudge)
-            if other is None:
-                return None
-            slopes[:, k] = (other[0] - miss) / NUDGE
-        return slopes
-
-    def _near(self, state: Array) -> bool:
-        """Whether the driver still goes round in the same sense, at a speed of the same order."""
-        speed = self.layout.coordinates + self.first
-        share = state[self.which == speed][0] / self.row[speed]
-        return bool(np.all(np.isfinite(state)) and 1 / FAR < share < FAR)

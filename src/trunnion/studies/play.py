@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.model_findings import of_run
+from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references

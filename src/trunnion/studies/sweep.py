@@ -28,7 +28,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.cycle.course import CycleCourse, margin_of
 from trunnion.cycle.cycle_kernel import Engine, Many
 from trunnion.cycle.fill import CONDITIONS
-from trunnion.cycle.model_findings import of_run
+from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.summary import inputs, member_units, references

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.locks import locks_of, margins_without
+from trunnion.cycle.locking import locks_of, margins_without
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.model_findings import of_run, shared_dimensions
+from trunnion.cycle.findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted

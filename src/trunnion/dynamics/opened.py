@@ -20,7 +20,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import networkx as nx  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 
@@ -129,26 +128,36 @@ def of_several(mechanism: Mechanism) -> list[str]:
 
 def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
     """Joints on the shortest ways around the joints that are cut."""
-    links, nearby = nx.Graph(), set[str]()
-    links.add_nodes_from(mechanism.effective_links)
-    for name, joint in mechanism.effective_joints.items():
-        if name not in cut:
-            links.add_edge(*joint.links, joint=name)
+    edges = {name: joint.links for name, joint in mechanism.effective_joints.items() if name not in cut}
+    nearby = set[str]()
     for cut_joint in cut:
         first, last = mechanism.effective_joints[cut_joint].links
-        if nx.has_path(links, first, last):
-            nearby |= {links.edges[ends]["joint"] for ends in itertools.pairwise(nx.shortest_path(links, first, last))}
+        came, ahead = dict[str, tuple[str, str]](), [first]
+        for link in ahead:
+            for name, (one_end, other_end) in edges.items():
+                farther = other_end if link == one_end else one_end if link == other_end else first
+                if farther != first and farther not in came:
+                    came[farther] = name, link
+                    ahead.append(farther)
+        while last in came:
+            name, last = came[last]
+            nearby.add(name)
     return nearby
 
 
 def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
-    links, mass = nx.Graph(joint["links"] for joint in data["joints"].values()), mechanism.parameters()
-    links.add_nodes_from(data["links"])
-    parts = [part for part in nx.connected_components(links) if mechanism.fixed_link not in part]
-    loose = [max((link for link in mechanism.links if link in part), key=lambda link: mass[f"links.{link}.mass"])
-             for part in parts]  # fmt: skip
-    return sorted(loose, key=list(data["links"]).index)
+    part, mass = {link: {link} for link in data["links"]}, mechanism.parameters()
+    for joint in data["joints"].values():
+        first, other = (part[link] for link in joint["links"])
+        if first is not other:
+            first |= other
+            part.update(dict.fromkeys(other, first))
+    loose = {id(links): links for links in part.values() if mechanism.fixed_link not in links}
+    return [
+        max((link for link in mechanism.links if link in links), key=lambda link: mass[f"links.{link}.mass"])
+        for links in loose.values()
+    ]
 
 
 def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], run: Run) -> tuple[str, ...]:

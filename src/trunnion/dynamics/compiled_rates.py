@@ -261,14 +261,13 @@ def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Nu
     count, unit = len(motion.names), motion.trial
 
     def step(numbers: list[Number]) -> list[Number]:
-        second, columns = numbers[:count], []
+        second = numbers[:count]
+        sizes = [
+            DIFFERENCE * np.maximum(np.abs(number), 1e-2 * size) for number, size in zip(second, unit, strict=True)
+        ]
+        ahead = [np.where(number < 0.0, -size, size) for number, size in zip(second, sizes, strict=True)]
         missed = _missed(motion, at, second)
-        for k, size in enumerate(unit):
-            ahead = DIFFERENCE * np.maximum(np.abs(second[k]), 1e-2 * size)
-            ahead = np.where(second[k] < 0.0, -ahead, ahead)
-            tried = [number + ahead if i == k else number for i, number in enumerate(second)]
-            columns.append([(a - b) / ahead for a, b in zip(_missed(motion, at, tried), missed, strict=True)])
-        change, pivots = _eliminated([list(row) for row in zip(*columns, strict=True)], missed)
+        change, pivots = _eliminated(_slopes(motion, at, second, ahead, missed), missed)
         turned: Number = 1.0  # the sign of the determinant, see `state.Accelerated`
         for pivot in pivots:
             turned = np.where(pivot > 0.0, turned, -turned)
@@ -287,41 +286,45 @@ def _affine(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Numbe
     """Accelerations where efforts are affine in them, the moment with the forces of closed contacts, and 1 where there
     is doubt.
 
-    The columns of M are told from rest and without contacts, whose forces would leave no digits to the differences.
+    The slopes are told from rest and without contacts that give, whose forces would leave no digits to the differences.
     """
     count, active = len(motion.names), motion.held(at)
-    nothing: Any = [0.0] * count
-    free = at._replace(onsets=tuple(None if isinstance(onset, Closed) else onset for onset in at.onsets))
-    still = at._replace(rate=nothing, onsets=(None,) * len(at.onsets))
-    zero, columns = _missed(motion, still, nothing, active), []
-    for k, size in enumerate(motion.trial):
-        step = [size if i == k else 0.0 for i in range(count)]
-        moved = _missed(motion, still, step, active)
-        columns.append([(number - rest) / size for number, rest in zip(moved, zero, strict=True)])
-    contacts = len(zero) - count
-    for k in range(contacts):
-        forces = [motion.force if i == k else 0.0 for i in range(contacts)]
-        pushed = _missed(motion, still._replace(onsets=motion.forced(at.onsets, forces, active)), nothing)
-        efforts: list[Number] = [(number - rest) / motion.force for number, rest in zip(pushed, zero, strict=False)]
-        columns.append(efforts + [0.0] * contacts)
-    right = [-number for number in _missed(motion, free, nothing, active)]
-    numbers, pivots = _eliminated([list(row) for row in zip(*columns, strict=True)], right)
     doubt: Number = 0.0
-    if contacts:
+    units = [*motion.trial, *[motion.force] * (len(active.closed) + len(active.walls))]
+    nothing: Any = [0.0] * len(units)
+    closed = tuple(onset if isinstance(onset, Closed) else None for onset in at.onsets)
+    still = at._replace(rate=nothing[:count], onsets=closed)
+    matrix = _slopes(motion, still, nothing, units, _missed(motion, still, nothing, active), active)
+    numbers, pivots = _eliminated(matrix, [-number for number in _missed(motion, at, nothing, active)])
+    if active.closed:
         for pivot in pivots:  # where one is not above 0 the forces have no solution, or several
             doubt = np.maximum(doubt, np.where(pivot > 0.0, 0.0, 1.0))
-        onsets = motion.forced(at.onsets, numbers[count:], active)
-        at = at._replace(onsets=motion.shared(onsets, active.walls))
+        at = at._replace(onsets=motion.shared(motion.forced(at.onsets, numbers[count:], active), active.walls))
     return numbers[:count], at, doubt
 
 
-def _missed(motion: FreeMotion, at: Moment, second: Any, active: Held = NONE) -> list[Number]:
-    """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0."""
-    senses = motion.senses(at)
+def _missed(motion: FreeMotion, at: Moment, numbers: Any, active: Held = NONE) -> list[Number]:
+    """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0. numbers:
+    accelerations, then the forces of these contacts."""
+    second, forces, senses = numbers[: len(motion.names)], numbers[len(motion.names) :], motion.senses(at)
+    if active.closed:
+        at = at._replace(onsets=motion.forced(at.onsets, forces, active))
     back, driven = motion.solve(at, second, senses, sliding=True), motion.driven(at, second, senses)
     moved = {k: motion.contacts[k].accelerations(back.walk) for k in active.closed}
     efforts = [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
     return [*efforts, *(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)]
+
+
+def _slopes(
+    motion: FreeMotion, at: Moment, numbers: list[Number], steps: Sequence[Number], missed: list[Number],
+    active: Held = NONE,
+) -> list[list[Number]]:  # fmt: skip
+    """How what is missed changes with each of the numbers, (equation, number), by differences."""
+    columns = []
+    for k, step in enumerate(steps):
+        tried = _missed(motion, at, [number + step if i == k else number for i, number in enumerate(numbers)], active)
+        columns.append([(after - before) / step for after, before in zip(tried, missed, strict=True)])
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:

@@ -84,17 +84,12 @@ class DriveCourse:
         return onward and self.travel >= FEWEST * TURN and bool(self.courses.at(self.time[-1:])[SPEED, 0] != 0.0)
 
     def when(self, gone: float) -> float:
-        """The time at which the coordinate has gone so far, s."""
-        k = int(np.clip(np.searchsorted(self.gone, gone), 1, len(self.gone) - 1))
-        begin = self.courses.at(self.time[:1])[COORDINATE, 0]
-
-        def ahead(time: float) -> float:
-            return float(self.sense * (self.courses.at(np.array([time]))[COORDINATE, 0] - begin)) - gone
-
-        low, high = (float(time) for time in self.time[k - 1 : k + 1])
-        if not ahead(low) < 0.0 < ahead(high):
-            return low if ahead(low) >= 0.0 else high
-        return float(brentq(ahead, low, high, xtol=1e-16, rtol=1e-15))
+        """The first time at which the coordinate has gone so far, s."""
+        first, last = self.courses.edges[[0, -1]]
+        times = self.courses.passages(
+            COORDINATE, float(self.courses.at(first[None])[COORDINATE, 0] + self.sense * gone)
+        )
+        return float(times[0] if len(times) else last if gone > 0.0 else first)
 
     def largest(self, row: int, sign: float = 1.0, since: float | None = None) -> float:
         """The largest value of a row, or of its opposite, since a time, s."""

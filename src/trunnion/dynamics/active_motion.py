@@ -34,7 +34,7 @@ from trunnion.dynamics.solution import Event, Impact, Solution, Stretch, over_st
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset, least_clearance
 
-__all__ = ["ActiveMotion", "ActiveSet", "OpenContact", "RowMode", "RowModes", "settled"]
+__all__ = ["ActiveMotion", "ActiveSet", "RowMode", "RowModes", "settled"]
 
 Array = NDArray[np.float64]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
@@ -282,18 +282,6 @@ class ActiveSet:
 
 
 @dataclass
-class OpenContact:
-    """A contact that lasts: its onset, and what it has come to so far."""
-
-    begin: float
-    approach: float
-    force: float = 0.0
-    depth: float = 0.0
-    wear: float = 0.0
-    impulse: float = 0.0
-
-
-@dataclass
 class ActiveMotion(Integration):
     """An integration that follows contacts and what sticks."""
 
@@ -301,7 +289,7 @@ class ActiveMotion(Integration):
         super().__post_init__()
         self.count = len(self.motion.contacts)
         self.mode = self.mode._replace(onsets=(None,) * self.count)
-        self._open: dict[int, OpenContact] = {}
+        self._open: dict[int, Impact] = {}  # contacts that last
         self._crossed: int | None = None  # joint that has changed
         self._let_go = 0.0  # sense in which a clutch that held begins to slip
         self._drive = next(iter(self.motion.drives.values()))
@@ -419,7 +407,7 @@ class ActiveMotion(Integration):
         onsets = list(self.onsets)
         if onsets[k] is None:
             onsets[k] = max(-rate, SLOWEST)
-            self._open[k] = OpenContact(time, max(-rate, 0.0))
+            self._begin(k, time, max(-rate, 0.0))
             self._say(time, "impact", k, -rate)
         else:
             onsets[k] = None
@@ -430,14 +418,16 @@ class ActiveMotion(Integration):
     def _say(self, time: float, kind: str, k: int, figure: float) -> None:
         self.solution.events.append(Event(time, kind, self.motion.contacts[k].label, figure, "m/s"))
 
+    def _begin(self, k: int, time: float, approach: float = 0.0) -> None:
+        """A contact begins that lasts."""
+        self._open[k] = Impact(self.motion.contacts[k].label, time, approach)
+        self.solution.impacts.append(self._open[k])
+
     def _end(self, k: int, time: float, rate: float) -> None:
         """A contact lifts off."""
-        self.solution.impacts.append(self._impact_of(k, self._open.pop(k), time, rate))
+        impact = self._open.pop(k)
+        impact.end, impact.separation = time, rate
         self._say(time, "lift-off", k, rate)
-
-    def _impact_of(self, k: int, contact: OpenContact, end: float, rate: float) -> Impact:
-        label, figures = self.motion.contacts[k].label, (contact.force, contact.depth, contact.wear, contact.impulse)
-        return Impact(label, contact.begin, end, contact.approach, rate, *figures)
 
     # ---- what holds, slips and is open ------------------------------------------------------------------------
 
@@ -564,26 +554,18 @@ class ActiveMotion(Integration):
             parted = courses.parted(courses.passages(SLIP))
             opening.impulse += courses.span * float(courses.mean()[NORMAL])
             opening.wear += courses.span * float(parted.mean(lambda rows: np.abs(rows[SLIP] * rows[NORMAL])))
-            if np.max(numbers[NORMAL]) > (1.0 - NEARLY) * opening.force and (place := courses.extreme(_normal)):
-                opening.force = max(opening.force, place.value)
-            if self.motion.contacts[k].rigid:
-                continue
-            if np.max(-numbers[GAP]) > (1.0 - NEARLY) * opening.depth and (place := courses.extreme(_depth)):
-                opening.depth = max(opening.depth, place.value)
+            for key, number, sign in (("force", NORMAL, 1.0), ("depth", GAP, -1.0)):
+                if key == "depth" and self.motion.contacts[k].rigid:
+                    continue
+                most = getattr(opening, key)
+                if np.max(sign * numbers[number]) > (1.0 - NEARLY) * most:
+                    place = courses.extreme(lambda rows, number=number: rows[number], sign)  # type: ignore[misc]
+                    setattr(opening, key, most if place is None else max(most, sign * place.value))
 
     def run(self, row: Array) -> Solution:
         """The motion from an initial row; contacts that last at its end have an end that is not known."""
         at = self.moment(self.start, row)
         self._limited = {i: 1.0 if self._over_limit(i, at)[0] > 0.0 else -1.0 for i in self._limited}
         super().run(row)
-        self.solution.impacts += [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
         self.solution.impacts.sort(key=lambda impact: impact.begin)
         return self.solution
-
-
-def _normal(rows: Array) -> Array:
-    return np.asarray(rows[NORMAL])
-
-
-def _depth(rows: Array) -> Array:
-    return np.asarray(-rows[GAP])

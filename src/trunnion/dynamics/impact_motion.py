@@ -24,7 +24,7 @@ from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.active_motion import MEET as SLOW
-from trunnion.dynamics.active_motion import ActiveMotion, OpenContact, RowMode, RowModes, settled
+from trunnion.dynamics.active_motion import ActiveMotion, RowMode, RowModes, settled
 from trunnion.dynamics.bordered import nearest
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics
@@ -303,7 +303,9 @@ class ImpactMotion(ActiveMotion):
                     self._end(k, time, float(struck.after[i]))
             elif case is not OPEN:
                 label, rate = self.motion.contacts[k].label, float(struck.after[i])
-                self.solution.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
+                self.solution.impacts.append(
+                    Impact(label, time, approach, time, rate, force=np.nan, wear=wear, impulse=normal)
+                )
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
         if self.mode.senses:
@@ -333,7 +335,7 @@ class ImpactMotion(ActiveMotion):
             if onsets[k] is None and k in self._open:
                 self._end(k, time, 0.0)
             elif onsets[k] is not None and k not in self._open:
-                self._open[k] = OpenContact(time + self.pauses.get(k, 0.0), 0.0)
+                self._begin(k, time + self.pauses.get(k, 0.0))
                 self._say(self._open[k].begin, "closes", k, np.nan)
         self.pauses = {}
 

@@ -15,7 +15,7 @@ from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import Mode, Moment
 
-__all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch", "over_steps", "step_nodes"]
+__all__ = ["CLOSE", "Ended", "Event", "Impact", "Solution", "Stretch", "over_steps", "step_nodes"]
 
 Array = NDArray[np.float64]
 
@@ -32,20 +32,21 @@ class Event(NamedTuple):
     unit: str = ""
 
 
-class Impact(NamedTuple):
+@dataclass
+class Impact:
     """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
     separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, and impulse ∫ F dt,
     N s."""
 
     label: str
     begin: float
-    end: float
     approach: float
-    separation: float
-    force: float
-    depth: float
-    wear: float
-    impulse: float
+    end: float = np.nan
+    separation: float = np.nan
+    force: float = 0.0
+    depth: float = 0.0
+    wear: float = 0.0
+    impulse: float = 0.0
 
 
 class Stretch(NamedTuple):
@@ -79,7 +80,7 @@ class Ended(NamedTuple):
 class Solution:
     """What an integration found: stretches one after the other, events, and why it ended early, if it did.
 
-    notes: figures of findings by their code; impacts: contacts of joints in play that are over, at the end all.
+    notes: figures of findings by their code; impacts: contacts of joints in play, by their begin at the end.
     """
 
     layout: Layout

@@ -71,7 +71,8 @@ class Courses:
 
     edges: of the panels, rising, s, (edge,); coefficients: of Chebyshev polynomials, (panel, row, coefficient), NaN
     where a row has no value; states: what every panel was said to be by who solved it; breaks: edges at which rows may
-    jump or bend; sizes: the largest magnitude of what is like each row; asked: how many times were solved.
+    jump or bend; sizes: the largest magnitude of what is like each row; asked: how many times were solved; loosened: by
+    how many times the tolerance was loosened, as rows are rough everywhere, see `Accuracy.most`.
     """
 
     edges: Array
@@ -80,6 +81,7 @@ class Courses:
     breaks: Array
     sizes: Array
     asked: int
+    loosened: float = 1.0
 
     @classmethod
     def of(
@@ -480,7 +482,7 @@ class _Resolving:
         changes = edges[1:-1][panels.labels[1:] != panels.labels[:-1]]
         breaks = np.unique(np.concatenate([self._breaks[k], changes]))
         states, sizes = panels.labels // 2, self._sizes[:, k]
-        return Courses(edges, panels.coefficients, states, breaks, sizes, int(self._asked[k]))
+        return Courses(edges, panels.coefficients, states, breaks, sizes, int(self._asked[k]), float(self._loosened[k]))
 
 
 def _fitted(rows: Array) -> Array:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Courses
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.cycle.course import CycleCourse, Means, course_of
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
@@ -356,6 +356,18 @@ def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
         yield Finding.warning("cycle.not_common", "drivers", what, remedy, duration=run.cycle.duration)
 
 
+def _rough(cycle: Cycle) -> Iterator[Finding]:
+    """Figures of the cycle that are known to fewer digits, for something changes too finely to be resolved."""
+    course, tolerance = cycle.course, Accuracy().tolerance
+    if course is not None and not cycle.run.seats and course.courses.loosened > 1.0:
+        share = course.courses.loosened * tolerance
+        what = (
+            f"something changes so finely over the cycle that its figures are known to {share:.1g} of the largest alone"
+        )
+        remedy = "look for loads, laws or tables that change many times over the cycle, or at random"
+        yield Finding.warning("cycle.rough", "", what, remedy, share=share)
+
+
 # ---- loads and springs ----------------------------------------------------------------------------------------
 
 
@@ -578,6 +590,6 @@ def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[fl
 
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
-    _not_assembled, _without_answer, _locked, _resting, _ranges, _no_common_period, _driving_resistances, _springs,
-    _slack, _idle_loads, _uncounted_work, _lost_contacts,
+    _not_assembled, _without_answer, _locked, _resting, _ranges, _no_common_period, _rough, _driving_resistances,
+    _springs, _slack, _idle_loads, _uncounted_work, _lost_contacts,
 )  # fmt: skip

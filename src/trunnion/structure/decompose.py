@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from trunnion.errors import Finding, MechanismError, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.structure.generic import GEAR, SPIN, Constraint, Gears, Generic, Joints, Places, constraints, rank
+from trunnion.structure.generic import GEAR, SPIN, Constraint, Gears, Joints, Places, constraints, fault, rank
 from trunnion.structure.graph import components, longest_loop, matching, ordered
 from trunnion.structure.passive import passive
 
@@ -134,7 +134,15 @@ def decompose(mechanism: Mechanism) -> Plan:
     # in space axes that are parallel or meet are common, and the rank at a pose tells; in the plane the count does
     by_rank = not planar or mechanism.over_constraint == "minimum-norm"
     if moved > drivers or (moved < drivers and not by_rank):
-        raise MechanismError([_undriven(moved, drivers, len(spinning))])
+        suffix = f" beside {counted(len(spinning), 'passive spin')}" if spinning else ""
+        has = "is no driver" if drivers == 0 else "is one driver" if drivers == 1 else f"are {drivers} drivers"
+        what = f"the mobility is {moved} by Grübler's formula{suffix}, but there {has}"
+        more = "drive a joint for each freedom left, or add a link or joint that removes it"
+        fewer = (
+            "remove a driver, or a joint or link that constrains twice; if it moves all the same, as a parallelogram "
+        )
+        fewer += "with a third crank does, state over_constraint: minimum-norm"
+        raise MechanismError([Finding(what, "drivers", more if moved > drivers else fewer)])
     if by_rank and (moved < drivers or FREEDOMS[mechanism.space] * len(bodies) > len(determines)):
         return _as_one(table, mobility, spinning)
     after: list[set[int]] = [set() for _ in bodies]
@@ -148,10 +156,10 @@ def decompose(mechanism: Mechanism) -> Plan:
         parts[part].append(bodies[k])
         for other in after[k]:
             before[part_of[other]] |= {part} - {part_of[other]}
-    if planar and (fault := Generic(mechanism, bodies, determines, table.links_of).fault(left_over, parts, before)):
+    if planar and (finding := fault(mechanism, determines, table.links_of, left_over, parts)):
         if by_rank:
             return _as_one(table, mobility, spinning)
-        raise MechanismError([fault])
+        raise MechanismError([finding])
     placed = {mechanism.fixed_link}
     modules: list[Module] = []
     for part in ordered(before, [table.numbers[links[0]] for links in parts]):
@@ -166,20 +174,6 @@ def _as_one(table: LinkTable, mobility: int, spinning: Mapping[str, tuple[str, s
     bodies = list(table.numbers)[1:]
     module = table.module(bodies, {table.mechanism.fixed_link}, list(table.mechanism.gears))
     return Plan((replace(module, kind="general", redundant=True),), mobility, tuple(spinning))
-
-
-def _undriven(mobility: int, drivers: int, spins: int) -> Finding:
-    """The finding of drivers that are not as many as the freedoms that have an effect."""
-    has = "is no driver" if drivers == 0 else "is one driver" if drivers == 1 else f"are {drivers} drivers"
-    remedy = (
-        "drive a joint for each freedom left, or add a link or joint that removes it"
-        if mobility > drivers
-        else "remove a driver, or a joint or link that constrains twice; if it moves all the same, as a parallelogram "
-        "with a third crank does, state over_constraint: minimum-norm"
-    )
-    suffix = f" beside {counted(spins, 'passive spin')}" if spins else ""
-    what = f"the mobility is {mobility} by Grübler's formula{suffix}, but there {has}"
-    return Finding(what, "drivers", remedy)
 
 
 class LinkTable:

@@ -55,27 +55,9 @@ _PLACES = {
 _RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "simulate", "sweep", "tolerance"}
 
 __all__ = [
-    "FrictionMethod",
-    "Mechanism",
-    "MechanismError",
-    "Status",
-    "allocate",
-    "analyse",
-    "assemble",
-    "check",
-    "design",
-    "exchange",
-    "locking",
-    "play",
-    "plot",
-    "read",
-    "report",
-    "rig",
-    "save",
-    "simulate",
-    "sweep",
-    "tolerance",
-]
+    "FrictionMethod", "Mechanism", "MechanismError", "Status", "allocate", "analyse", "assemble", "check", "design",
+    "exchange", "locking", "play", "plot", "read", "report", "rig", "save", "simulate", "sweep", "tolerance",
+]  # fmt: skip
 
 __getattr__ = loader("trunnion", _PLACES, _RESULTS)
 

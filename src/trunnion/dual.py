@@ -14,15 +14,5 @@ from trunnion.algebra.dual import Dual, derivative, functions, parts, primal, se
 from trunnion.groups import ccc
 
 __all__ = [
-    "Dual",
-    "ccc",
-    "derivative",
-    "functions",
-    "linalg",
-    "lines",
-    "parts",
-    "primal",
-    "seed",
-    "spatial",
-    "vectors",
-]
+    "Dual", "ccc", "derivative", "functions", "linalg", "lines", "parts", "primal", "seed", "spatial", "vectors",
+]  # fmt: skip

@@ -60,22 +60,16 @@ class _Run:
 
     def findings(self, path: Path, targets: Sequence[Target]) -> list[Finding]:
         """Which targets an input would be lost to."""
-        lost = (
+        lost = [
             target for target in targets if same(target.path, path) and not (target.over and same(target.over, path))
-        )
-        return [
-            Finding(f"{_called(target.path, path)} is read here, and would be written over{_by(target)}", "", REMEDY)
-            for target in lost
         ]
+        return [Finding(f"{_called(target.path, path)} is read here, and would be written over"
+                        + f" by {target.option}" * bool(target.option), "", REMEDY) for target in lost]  # fmt: skip
 
 
 def _called(written: Path, read: Path) -> str:
     """A file by the name it is written under, and the other that it has."""
     return f"'{written}'" if str(written) == str(read) else f"'{written}', which is '{read}',"
-
-
-def _by(target: Target) -> str:
-    return f" by {target.option}" if target.option else ""
 
 
 _RUN: ContextVar[_Run | None] = ContextVar("run", default=None)
@@ -146,9 +140,8 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     with _unwritable(destination):
         target, stream = _destination(destination)
     folder = target.parent if target else Path(tempfile.gettempdir())
-    temporary = (
-        folder / f".{destination.stem[:40]}-{secrets.token_hex(4)}{destination.suffix}"
-    )  # known before it is there
+    draft = f".{destination.stem[:40]}-{secrets.token_hex(4)}{destination.suffix}"
+    temporary = folder / draft  # known before it is there
     try:
         with _unwritable(destination, "make the folder first, or write elsewhere"):
             os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))

@@ -50,7 +50,12 @@ def verb(lacks: str = "", **helps: str | ParameterInfo) -> Callable[[Callable[..
             for name, group in groups.items():
                 own[name] = group(**{part.name: options[part.name] for part in fields(group) if part.name in options})
             try:
-                with writing(list(_targets(outputs(run), options))):
+                targets = []
+                for name in outputs(run):
+                    paths, flag = options.get(name), f"--{name.strip('_').replace('_', '-')}"
+                    several = paths if isinstance(paths, list) else [paths] if paths is not None else []
+                    targets += [Target(flag, path, options.get(IN_PLACE.get(name, ""))) for path in several]
+                with writing(targets):
                     function(**own)
             except MechanismError as error:  # what Python calls by the name of an argument is an option here
                 flags = flags_of(run)
@@ -78,8 +83,10 @@ def _spread(
 
     def add(name: str, hint: Any, usual: Any, shared: bool) -> None:
         info = _read(name.strip("_"), helps)
-        argument = isinstance(info, ArgumentInfo)
-        info.metavar = info.metavar or (name.upper() if argument else _word(hint))
+        argument, kind = isinstance(info, ArgumentInfo), next(types_in(hint))
+        words = {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}  # none for a switch
+        word = "|".join(get_args(kind)) if get_origin(kind) is Literal else words.get(kind)
+        info.metavar = info.metavar or (name.upper() if argument else word)
         default = inspect.Parameter.empty if usual is MISSING else usual
         annotation = Annotated[hint, info]
         parameter = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
@@ -114,14 +121,6 @@ def _types(group: type) -> Hints:
     return get_type_hints(group, include_extras=True)
 
 
-def _word(hint: Any) -> str | None:
-    """The word of the help for a value of a type; none for a switch."""
-    kind = next(types_in(hint))
-    if get_origin(kind) is Literal:
-        return "|".join(get_args(kind))
-    return {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(kind)
-
-
 def types_in(hint: Any) -> Iterator[type]:
     """The types that a type is made of: of `list[str] | None` text and none; choices are one type."""
     parts = () if get_origin(hint) is Literal else get_args(hint)
@@ -152,10 +151,3 @@ def flags_of(verb: Callable[..., None]) -> dict[str, str]:
 def outputs(verb: Callable[..., None]) -> list[str]:
     """The parameters that name files to be written: every option that takes a path. Inputs are arguments or texts."""
     return [name for name, hint, _, _ in options_of(verb) if Path in types_in(hint)]
-
-
-def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:
-    for name in names:
-        paths = options.get(name)
-        for path in paths if isinstance(paths, list) else [paths] if paths is not None else []:
-            yield Target(f"--{name.strip('_').replace('_', '-')}", path, options.get(IN_PLACE.get(name, "")))

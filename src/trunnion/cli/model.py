@@ -16,7 +16,6 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.files import folder, whole
 
 if TYPE_CHECKING:
-    from trunnion.cycle.inspect import Check
     from trunnion.cycle.vocabulary import NamedMeasure, NamedNumber
 
 __all__ = ["check", "examples", "schema", "studio"]
@@ -36,6 +35,7 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
         _list(model)
         return
     from trunnion.cycle.inspect import check as inspect
+    from trunnion.views.assembly import lines
 
     if assemblies:
         from trunnion.views.draw import check_figure
@@ -44,24 +44,10 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
     mechanism = model.read()
     with model.lines():
         checked = inspect(mechanism)
-    line(mechanism.name or model.file.name, "bold")
-    _show_structure(checked, len(mechanism.drivers))
-    if assemblies:
-        from trunnion.views.draw import save
-        from trunnion.views.mode_drawings import ways as drawings
-
-        save(drawings(mechanism, checked.choices), assemblies)
-        wrote(assemblies)
-    end(checked.findings, model.file, "assembly measures", every=True)
-
-
-def _show_structure(checked: "Check", drivers: int) -> None:
-    """Mobility, structural formula, and modules with the ways to assemble them, a line each."""
-    from trunnion.views.assembly import lines
-
     rank = checked.rank_mobility
     by_rank = "by rank unknown: no position can be assembled" if rank is None else f"{rank} by rank"
-    line(f"mobility {checked.mobility} by formula, {by_rank}; drivers: {drivers}")
+    line(mechanism.name or model.file.name, "bold")
+    line(f"mobility {checked.mobility} by formula, {by_rank}; drivers: {len(mechanism.drivers)}")
     line(f"formula  {checked.formula or '(no moving link)'}")
     for number, (module, count) in enumerate(zip(checked.plan.modules, checked.assemblies, strict=True)):
         modes = "" if module.rank == 1 else f", {count} assembly {'mode' if count == 1 else 'modes'}"
@@ -71,6 +57,13 @@ def _show_structure(checked: "Check", drivers: int) -> None:
         for choice in (choice for choice in checked.choices if choice.module == number):
             for text in lines(choice):
                 line(f"    {text}")
+    if assemblies:
+        from trunnion.views.draw import save
+        from trunnion.views.mode_drawings import ways as drawings
+
+        save(drawings(mechanism, checked.choices), assemblies)
+        wrote(assemblies)
+    end(checked.findings, model.file, "assembly measures", every=True)
 
 
 def _list(model: Model) -> None:

@@ -77,6 +77,7 @@ class Model:
         So a number that is set stands against what is said of all joints, and may be one that only the other law has.
         swept: a value of each number that the verb replaces, which may be such a one too.
         """
+        from trunnion.model.checks.units import bare_number
         from trunnion.model.mechanism import read_mechanism
         from trunnion.model.screen import follow, stated_units
 
@@ -84,7 +85,12 @@ class Model:
         values = dict(setting(text) for text in self.set_ or ())
         if self.seat is not None:
             mechanism = mechanism.with_seats(self.seat)
-        bare = list(_bare(mechanism, values))
+        bare: list[Finding] = []  # numbers that lack the unit that the model has
+        for name, value in values.items():
+            with suppress(MechanismError):  # of a name that means nothing, which is said where it is set
+                if not isinstance(value, str):
+                    numbers = mechanism.parameter_set
+                    bare += bare_number(numbers, numbers.resolve(name), value)
         if self.friction:
             mechanism = mechanism.with_friction(self.friction, {**(swept or {}), **values})
         elif values:
@@ -101,17 +107,6 @@ class Model:
             yield
         except MechanismError as error:
             raise MechanismError(placed(error.findings, self.file)) from None
-
-
-def _bare(mechanism: "Mechanism", values: Mapping[str, float | str]) -> Iterator[Finding]:
-    """Numbers that lack the unit that the model has."""
-    from trunnion.model.checks.units import bare_number
-
-    numbers = mechanism.parameter_set
-    for name, value in values.items():
-        with suppress(MechanismError):  # of a name that means nothing, which is said where it is set
-            if not isinstance(value, str):
-                yield from bare_number(numbers, numbers.resolve(name), value)
 
 
 def placed(findings: Iterable[Finding], file: Path, sections: Iterable[str] = ()) -> list[Finding]:

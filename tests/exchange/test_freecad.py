@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trunnion import analyse
-from trunnion.errors import MechanismError
 from trunnion.exchange import Draft, import_file, model_text
 from trunnion.model.mechanism import read_mechanism
 
@@ -265,56 +264,3 @@ def test_what_is_no_pair_is_said(kind: str, tmp_path: Path) -> None:
     assert set(draft.pairs) == {"P"}
     (lost,) = [finding for finding in draft.findings if finding.code == "exchange.lost"]
     assert f"{kind}, which is no pair (J)" in lost.what
-
-
-def archive(tmp_path: Path, text: str | bytes, name: str = "Document.xml") -> Path:
-    with zipfile.ZipFile(tmp_path / "bad.FCStd", "w", zipfile.ZIP_DEFLATED) as file:
-        file.writestr(name, text)
-    return tmp_path / "bad.FCStd"
-
-
-HEAD = '<?xml version="1.0"?>'
-ENTITY = '<!DOCTYPE d [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><Document>&b;</Document>'
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        (HEAD + ENTITY, "entities"),
-        (HEAD + "<Document><Objects>", "damaged"),
-        ("\x00\x01binary", "damaged"),
-        (HEAD + "<Document/>", "no assembly of FreeCAD"),
-        (HEAD + '<D><Objects><Object type="App::Part" name="A"/></Objects><ObjectData><Object name="A"><Properties>'
-         '<Property name="SolverId"/></Properties></Object></ObjectData></D>', "Assembly4"),
-    ],
-)  # fmt: skip
-def test_bad_documents_are_refused_in_a_sentence(text: str, says: str, tmp_path: Path) -> None:
-    with pytest.raises(MechanismError, match=says) as error:
-        import_file(archive(tmp_path, text))
-    assert len(error.value.findings) == 1
-
-
-def test_bad_archives_are_refused_in_a_sentence(tmp_path: Path) -> None:
-    cases = {"no Document.xml": archive(tmp_path, "x", "other.xml").read_bytes(), "damaged": b"PK\x03\x04cut"}
-    good = four_bar(np.eye(4), ALIKE).save(tmp_path / "good.FCStd")
-    whole = good.read_bytes()
-    for says, data in (
-        *cases.items(),
-        ("damaged", whole[: len(whole) // 2]),
-        ("damaged", whole[:40] + b"!" * 400 + whole[440:]),
-    ):
-        (tmp_path / "bad.FCStd").write_bytes(data)
-        with pytest.raises(MechanismError, match=says):
-            import_file(tmp_path / "bad.FCStd")
-
-
-@pytest.mark.parametrize(
-    "old", ['Q3="', 'Px="', 'Integer value="1"', 'name="Assembly" count', "Sub value=", "Link value="]
-)
-@pytest.mark.parametrize("new", ["", 'Q3="x', 'Px="nan', 'Integer value="99"', "Link value="])
-def test_replaced_parts_never_end_in_a_traceback(old: str, new: str, tmp_path: Path) -> None:
-    drawing = four_bar(np.eye(4), ALIKE)
-    try:
-        model_text(import_file(archive(tmp_path, drawing.text().replace(old, new))))
-    except MechanismError as error:
-        assert error.findings  # noqa: PT017 (it may be read as well)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-import time
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -149,82 +148,6 @@ def test_a_cavity_is_subtracted(tmp_path: Path) -> None:
     corners = np.vstack([BOX * CORNERS, BOX * (0.25 + 0.5 * CORNERS)])
     draft = import_file(written(tmp_path, stl(corners, np.vstack([FACES, FACES[:, ::-1] + 8]))))
     assert draft.bodies["part"].mass == pytest.approx(7850 * np.prod(1e-3 * BOX) * 7 / 8, rel=1e-6)
-
-
-ENTITIES = '<!DOCTYPE m [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>'
-BOXED = solid(1, BOX * CORNERS, FACES)
-ITEM = '<item objectid="1"/>'
-
-
-def packed_bomb(folder: Path) -> Path:
-    return packed(folder, b"<model>" + b" " * 60_000_000 + b"</model>")
-
-
-def lying_bomb(folder: Path) -> Path:
-    """A zip that says its model is small, and unpacks to 60 MB."""
-    path = packed(folder, b"<model>" + b" " * 60_000_000 + b"</model>")
-    data = path.read_bytes()
-    path.write_bytes(data.replace(struct.pack("<I", 60_000_015), struct.pack("<I", 1000)))
-    return path
-
-
-def nested(count: int) -> str:
-    """Objects each of ten of the one before."""
-    parts = [BOXED]
-    for number in range(2, count + 2):
-        component = f'<component objectid="{number - 1}"/>' * 10
-        parts.append(f'<object id="{number}"><components>{component}</components></object>')
-    return "".join(parts)
-
-
-LOOP = '<object id="1"><components><component objectid="1"/></components></object>'
-HOSTILE_3MF = {
-    "bomb": packed_bomb,
-    "lying": lying_bomb,
-    "entities": lambda folder: packed(folder, model_3mf(BOXED, ITEM, head=ENTITIES)),
-    "external": lambda folder: packed(folder, model_3mf(BOXED, ITEM, head='<!DOCTYPE m SYSTEM "file:///etc/passwd">')),
-    "no zip": lambda folder: written(folder, b"PK\3\4 no zip at all", "part.3mf"),
-    "no model": lambda folder: packed(folder, b"<a/>", "readme.txt"),
-    "no object": lambda folder: packed(folder, model_3mf("", ITEM)),
-    "nothing": lambda folder: packed(folder, model_3mf(BOXED, "")),
-    "loop": lambda folder: packed(folder, model_3mf(LOOP, ITEM)),
-    "many": lambda folder: packed(folder, model_3mf(nested(6), '<item objectid="7"/>')),
-    "no corner": lambda folder: packed(folder, model_3mf(solid(1, BOX * CORNERS, FACES + 3), ITEM)),
-    "unit": lambda folder: packed(folder, model_3mf(BOXED, ITEM, "furlong")),
-    "transform": lambda folder: packed(folder, model_3mf(BOXED, '<item objectid="1" transform="1 2 3"/>')),
-    "numbers": lambda folder: packed(folder, model_3mf(BOXED.replace('x="0.0"', 'x="zero"'), ITEM)),
-}
-HOSTILE = {
-    "stl empty": ("part.stl", b""),
-    "stl junk": ("part.stl", np.random.default_rng(1).bytes(50_000)),
-    "stl text": ("part.stl", "solid für Gäste\nfacet\n".encode() * 100),
-    "stl cut": ("part.stl", stl(BOX * CORNERS, FACES)[:300]),
-    "stl count": ("part.stl", b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 500),
-    "glb junk": ("part.glb", np.random.default_rng(1).bytes(50_000)),
-    "glb cut": ("part.glb", struct.pack("<4sII", b"glTF", 2, 100) + struct.pack("<I4s", 80, b"JSON") + b'{"asset":'),
-    "glb empty": ("part.glb", struct.pack("<4sIII4s", b"glTF", 2, 24, 4, b"JSON") + b"{}  "),
-}
-
-
-def refused(path: Path) -> None:
-    start = time.perf_counter()
-    with pytest.raises(trunnion.MechanismError) as caught:
-        import_file(path)
-    assert time.perf_counter() - start < 60  # some 6 s where nothing else runs; it must not hang
-    assert len(caught.value.findings) == 1
-
-
-@pytest.mark.sample(15)
-@pytest.mark.spread(5)
-@pytest.mark.parametrize("kind", HOSTILE_3MF)
-def test_a_hostile_3mf_is_a_sentence(kind: str, tmp_path: Path) -> None:
-    refused(HOSTILE_3MF[kind](tmp_path))
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_a_hostile_mesh_is_a_sentence(kind: str, tmp_path: Path) -> None:
-    name, data = HOSTILE[kind]
-    refused(written(tmp_path, data, name))
 
 
 PARTS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}

@@ -21,8 +21,8 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
 from scipy.spatial.transform import Rotation
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, ImportOptions, Pair, free_name
+from trunnion.errors import MechanismError
+from trunnion.exchange.draft import PARALLEL, Body, Draft, ImportOptions, Pair, Place, few, free_name, refused
 
 __all__ = ["read"]
 
@@ -71,16 +71,14 @@ class DocumentObject:
         """The name that the user sees."""
         return self.value("Label", self.name)
 
-    def frame(self, *keys: str) -> Array:
-        """The first placement that there is, lengths in m, (4, 4); ValueError for one that is none."""
+    def frame(self, *keys: str) -> Place:
+        """The first placement that there is; ValueError for one that is none."""
         place = self.first(next((key for key in keys if key in self.properties), ""))
-        axes, (x, y, z) = np.eye(4), (float(place.get(key, "0")) for key in ("Px", "Py", "Pz"))
-        q = np.array([float(place.get(f"Q{k}", "01"[k == 3])) for k in range(4)])
-        axes[:3, 3] = x * MILLI, y * MILLI, z * MILLI
-        axes[:3, :3] = Rotation.from_quat(q).as_matrix()  # ValueError for 0
-        if not np.isfinite(axes).all():
+        shift = MILLI * np.array([float(place.get(key, "0")) for key in ("Px", "Py", "Pz")])
+        turn = Rotation.from_quat([float(place.get(f"Q{k}", "01"[k == 3])) for k in range(4)])  # ValueError for 0
+        if not np.isfinite([*turn.as_quat(), *shift]).all():
             raise ValueError
-        return axes
+        return Place(turn.as_matrix(), shift)
 
     def links(self, key: str) -> list[str]:
         """The names of objects that a property refers to, or the path of a connector."""
@@ -94,55 +92,45 @@ class DocumentObject:
 
 def read(path: Path, options: ImportOptions) -> Draft:
     """Read the assembly of a file."""
-    objects = _document(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            few(len(archive.namelist()), MEMBERS, "members")
+            few(archive.getinfo(MEMBER).file_size, LARGEST, f"bytes of {MEMBER}")
+            with archive.open(MEMBER) as stream:
+                objects = _objects(stream)
+    except MechanismError:
+        raise
+    except KeyError:
+        raise refused(f"has no {MEMBER}") from None
+    except DefusedXmlException:
+        raise refused(f"has entities in its {MEMBER}, which may hide anything") from None
+    except (zipfile.BadZipFile, zlib.error, ParseError, EOFError, NotImplementedError, RuntimeError, UnicodeError):
+        raise refused("is damaged, or no file of FreeCAD") from None
     assemblies = [each for each in objects.values() if each.type == ASSEMBLY]
     inner = {name for assembly in assemblies for name in assembly.links("Group")}
     outer = [assembly for assembly in assemblies if assembly.name not in inner]
     if not outer:
         what = "has no assembly of FreeCAD 1.0 or later, such as Assembly4 and A2plus do not make"
-        raise MechanismError(Finding(what, file=str(path), remedy="join the parts in FreeCAD's Assembly workbench"))
+        raise refused(what, remedy="join the parts in FreeCAD's Assembly workbench")
     draft = Draft(outer[0].label)
     if len(outer) > 1:
-        what = f"{outer[0].label} is read of {len(outer)} assemblies"
-        draft.warn("exchange.assemblies", "", what, "keep the others in files")
+        draft.lose("other assemblies", *(each.label for each in outer[1:]))
     try:
         _Assembly(objects, outer[0], draft).read()
     except (ValueError, KeyError, IndexError):
-        raise MechanismError(Finding("has a joint or placement that cannot be read", file=str(path))) from None
+        raise refused("has a joint or placement that cannot be read") from None
     if not draft.pairs:
-        raise MechanismError(Finding("has no joint between two parts that is read", file=str(path)))
+        raise refused("has no joint between two parts that is read")
     what = f"masses of {len(draft.bodies)} parts are not read: they follow from shapes that only FreeCAD knows"
     draft.note("exchange.masses", "links", what, "write those of each link, or import the parts as STEP too")
     return draft
 
 
-def _document(path: Path) -> dict[str, DocumentObject]:
-    """The objects of a file by name."""
-    what, remedy = "is damaged, or no file of FreeCAD", "save it with FreeCAD"
-    try:
-        with zipfile.ZipFile(path) as archive:
-            member = archive.getinfo(MEMBER)
-            if len(archive.namelist()) <= MEMBERS and member.file_size <= LARGEST:
-                with archive.open(member) as stream:
-                    return _objects(stream)
-        what = f"has more than {MEMBERS:,} members, or a {MEMBER} of more than {LARGEST:,} bytes"
-    except KeyError:
-        what = f"has no {MEMBER}"
-    except OverflowError:
-        what, remedy = f"has a {MEMBER} of more than {MOST:,} elements", "save the assembly alone"
-    except DefusedXmlException:
-        what = f"has entities in its {MEMBER}, which may hide anything"
-    except (zipfile.BadZipFile, zlib.error, ParseError, EOFError, NotImplementedError, RuntimeError, UnicodeError):
-        pass
-    raise MechanismError(Finding(what, file=str(path), remedy=remedy))
-
-
 def _objects(stream: Any) -> dict[str, DocumentObject]:
-    """The objects of a document, read as it comes so that what is not wanted takes no memory."""
+    """The objects of a document by name, read as it comes so that what is not wanted takes no memory."""
     types, objects = dict[str, str](), dict[str, DocumentObject]()
     for count, (_, element) in enumerate(iterparse(stream)):
-        if count > MOST:
-            raise OverflowError
+        few(count, MOST, "elements")
         name = element.get("name", "")
         if element.tag == "Property" and name not in PROPERTIES:
             element.clear()
@@ -160,7 +148,7 @@ class _Assembly:
     def __init__(self, objects: dict[str, DocumentObject], assembly: DocumentObject, draft: Draft) -> None:
         self.objects, self.assembly, self.draft = objects, assembly, draft
         self.bodies: dict[str, str] = {}  # name of the body by that of the object
-        self.frames: dict[str, tuple[Array, Array]] = {}  # of the connectors, by pair
+        self.frames: dict[str, tuple[Place, Place]] = {}  # of the connectors, by pair
 
     def read(self) -> None:
         """Add what is grounded, and the pairs of the joints."""
@@ -178,7 +166,7 @@ class _Assembly:
         loose = [each.label for each in members if each.name not in self.bodies and each.type not in INERT]
         if loose:
             draft.lose("parts without a joint", *loose)
-        places = np.array([frame[:3, 3] for both in self.frames.values() for frame in both])
+        places = [frame.shift for both in self.frames.values() for frame in both]
         size = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
         for name, (first, second) in self.frames.items():
             self._compare(draft.pairs[name], first, second, APART * size)
@@ -199,12 +187,12 @@ class _Assembly:
             self.bodies[name], self.draft.bodies[label] = label, Body(label)
         return self.bodies[name]
 
-    def _connector(self, joint: DocumentObject, which: str) -> tuple[str, Array]:
+    def _connector(self, joint: DocumentObject, which: str) -> tuple[str, Place]:
         """The part that moves with a connector, and the frame of the connector in that of the assembly."""
         path = joint.links(f"Reference{which}")
         if self.assembly.name in path:
             path = path[path.index(self.assembly.name) + 1 :]
-        frame, moving = np.eye(4), ""
+        frame, moving = Place(), ""
         for k, part in ((k, self.objects[name]) for k, name in enumerate(path) if name in self.objects):
             if part.type in GROUPS:
                 continue
@@ -246,29 +234,29 @@ class _Assembly:
             draft.lose("joints that do not join two parts", joint.label)
         else:
             name = free_name(joint.label, draft.pairs)
-            pair = Pair(name, PAIRS[kind], (self._body(part), self._body(mate)), second[:3, 3], first[:3, 2])
+            pair = Pair(name, PAIRS[kind], (self._body(part), self._body(mate)), second.shift, first.matrix[:, 2])
             paths = (".".join(joint.links(f"Reference{which}")[1:]) for which in "12")
             pair.comments.append(f"{kind} joint of {' and '.join(paths)}")
-            pair.limits = _limits(joint, kind, np.linalg.inv(first) @ second)
+            pair.limits = _limits(joint, kind, first.inverse @ second)
             draft.pairs[name], self.frames[name] = pair, (first, second)
 
-    def _compare(self, pair: Pair, first: Array, second: Array, most: float) -> None:
+    def _compare(self, pair: Pair, first: Place, second: Place, most: float) -> None:
         """A doubt where the frames of a joint do not coincide as its kind has it: the assembly was not solved."""
-        gap, axis = second[:3, 3] - first[:3, 3], first[:3, 2]
+        gap, axis = second.shift - first.shift, first.matrix[:, 2]
         if pair.type in ("cylindrical", "prismatic"):
             gap = gap - (gap @ axis) * axis
-        tilt = 0.0 if pair.type == "spherical" else float(np.linalg.norm(np.cross(axis, second[:3, 2])))
+        tilt = 0.0 if pair.type == "spherical" else float(np.linalg.norm(np.cross(axis, second.matrix[:, 2])))
         if np.linalg.norm(gap) > most or tilt > PARALLEL:
             what = f"its connectors are {1e3 * np.linalg.norm(gap):.3g} mm and {math.degrees(tilt):.3g}° apart"
             self.draft.warn("exchange.apart", f"joints.{pair.name}", what, "solve the assembly in FreeCAD and save it")
 
 
-def _limits(joint: DocumentObject, kind: str, between: Array) -> tuple[float, float] | None:
+def _limits(joint: DocumentObject, kind: str, between: Place) -> tuple[float, float] | None:
     """The range of a joint's coordinate from where it is drawn, rad or m; None if it is not limited on both sides."""
-    key, here, unit = "Length", between[2, 3], MILLI
-    if kind == "Revolute":
-        key, here, unit = "Angle", math.atan2(between[1, 0], between[0, 0]), math.pi / 180
-    if kind not in ("Revolute", "Slider") or not (joint.on(f"Enable{key}Min") and joint.on(f"Enable{key}Max")):
+    turn = math.atan2(between.matrix[1, 0], between.matrix[0, 0])
+    coordinates = {"Revolute": ("Angle", turn, math.pi / 180), "Slider": ("Length", float(between.shift[2]), MILLI)}
+    key, here, unit = coordinates.get(kind, ("", 0.0, 0.0))
+    if not key or not (joint.on(f"Enable{key}Min") and joint.on(f"Enable{key}Max")):
         return None
-    low, high = (float(joint.value(f"{key}{end}", "0")) * unit - float(here) for end in ("Min", "Max"))
+    low, high = (float(joint.value(f"{key}{end}", "0")) * unit - here for end in ("Min", "Max"))
     return (low, high) if low < high else None

@@ -58,14 +58,12 @@ def read(path: Path, options: ImportOptions) -> Draft:
 
 def _opened(path: Path, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:
     """The draft of a file, with the occurrence that each body comes from."""
-    file = Part21(path)
     try:
-        return _drafted(file, options)
+        return _drafted(Part21(path), options)
     except MechanismError:
         raise
     except BROKEN as error:
-        what = f"is not as ISO 10303-21 has it: {type(error).__name__} {error}"[:200]
-        raise refused(what) from None
+        raise refused(f"is not as ISO 10303-21 has it: {type(error).__name__} {error}"[:200]) from None
 
 
 def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:

@@ -148,7 +148,7 @@ _GROUPS = (
     ),
     Fault(
         "spin-carried-the-wrong-way",
-        "groups/spins.py",
+        "groups/spatial.py",
         "sense = -1.0 if group.joints[k].sides[1] in members else 1.0",
         "sense = 1.0 if group.joints[k].sides[1] in members else -1.0",
         ("tests/invariants/test_spatial_groups.py", "tests/reference/test_space_values.py", "-k", "spin"),

@@ -371,9 +371,13 @@ class _Resolving:
             rows, states = self._solve(mechanism, time)
             self._asked += ORDER * np.bincount(mechanism, minlength=len(self._asked))
             values = np.moveaxis(rows, 0, 1)  # (lane, row, node)
-            coefficients, labels = values @ FIT.T, _labelled(states, values)
+            coefficients = values @ FIT.T
+            # what every place of a panel is: its state, and whether any row of it has no value
+            labels = 2 * states.astype(np.intp) + np.any(~np.isfinite(values), axis=1)
             mixed = np.any(labels != labels[:, :1], axis=1)
-            tossed = self._tossed(mechanism, mixed, high - low)
+            # narrow panels of mechanisms with many of mixed states toss as rounding will, and have no breaks
+            many = np.bincount(mechanism[mixed], minlength=len(self._asked)) > self._accuracy.most
+            tossed = mixed & many[mechanism] & (high - low < TOSSED * self._span[mechanism])
             labels[tossed] = np.max(labels[tossed], axis=1, keepdims=True, initial=0)
             coefficients[tossed] = np.nan
             mixed &= ~tossed
@@ -383,7 +387,8 @@ class _Resolving:
             unresolved = mixed | rough
             tiny = high - low <= self._accuracy.shortest * self._span[mechanism]
             tiny |= self._crowded(mechanism, mixed, low, high)
-            self._break(mechanism[unresolved & tiny], high[unresolved & tiny])
+            for k in np.unique(mechanism[unresolved & tiny]):
+                self._breaks[k] = np.union1d(self._breaks[k], high[unresolved & tiny & (mechanism == k)])
             done = ~unresolved if round_ < self._accuracy.rounds else ~mixed
             panels = _Panels(mechanism, low, high, coefficients, labels[:, 0])
             self._done.append(panels.picked(done))
@@ -391,17 +396,14 @@ class _Resolving:
             if not len(left):
                 break
             even = left[~mixed[left]]
-            middle = _middle(low, high, even) if round_ < HALVED else _bending(time[even], values[even, worst[even]])
+            middle = ((low + high) / 2)[even, None]
+            if round_ >= HALVED:
+                middle = _bending(time[even], values[even, worst[even]])
             edges = [*np.column_stack([low[even], middle, high[even]])]
             changing = left[mixed[left]]
             edges += [np.concatenate([[low[k]], _changing(time[k], labels[k]), [high[k]]]) for k in changing]
             left = np.concatenate([even, changing])
             mechanism, low, high = _between(edges, mechanism[left])
-
-    def _tossed(self, mechanism: Labels, mixed: NDArray[np.bool_], width: Array) -> NDArray[np.bool_]:
-        """Narrow panels of mechanisms with many of mixed states: these toss as rounding will, and have no breaks."""
-        many = np.bincount(mechanism[mixed], minlength=len(self._asked)) > self._accuracy.most
-        return mixed & many[mechanism] & (width < TOSSED * self._span[mechanism])
 
     def _crowded(self, mechanism: Labels, mixed: NDArray[np.bool_], low: Array, high: Array) -> NDArray[np.bool_]:
         """Panels of mixed states of which there are several in one place, too narrow for so many breaks."""
@@ -470,11 +472,6 @@ class _Resolving:
         ).T
         return _between(list(parts), owner[chosen])
 
-    def _break(self, mechanism: Labels, times: Array) -> None:
-        """Keep times, s, at which breaks were located."""
-        for k in np.unique(mechanism):
-            self._breaks[k] = np.unique(np.concatenate([self._breaks[k], times[mechanism == k]]))
-
     def _courses(self, k: int, panels: _Panels) -> Courses:
         """The courses of one mechanism; the panels about located breaks have shrunk to nothing."""
         edges = np.append(panels.low, self._breaks[k][-1])
@@ -504,10 +501,6 @@ def _changing(time: Array, labels: Labels) -> Array:
     return np.asarray(time[np.unique(np.concatenate([after, after + 1]))])
 
 
-def _middle(low: Array, high: Array, panels: Labels) -> Array:
-    return np.asarray((low[panels] + high[panels]) / 2)[:, None]
-
-
 def _bending(time: Array, values: Array) -> Array:
     """The times of panels about the one at which a row bends most, (lane, 2): it may have a corner there, or jump."""
     slopes = np.diff(values) / np.diff(time)
@@ -515,9 +508,3 @@ def _bending(time: Array, values: Array) -> Array:
     k = np.argmax(bends, axis=1)
     lanes = np.arange(len(time))
     return np.column_stack([time[lanes, k], time[lanes, k + 2]])
-
-
-def _labelled(states: NDArray[np.integer], values: Array) -> Labels:
-    """What every place of a panel is, (lane, node): its state, and whether any row of it has no value."""
-    gone = np.any(~np.isfinite(values), axis=1)
-    return np.asarray(2 * states.astype(np.intp) + gone)

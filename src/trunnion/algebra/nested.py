@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,31 +12,17 @@ from trunnion.algebra.namespace import Number
 
 __all__ = ["each", "flat", "replaced", "zipped"]
 
-_Nested = TypeVar("_Nested")
 
-
-def each(value: _Nested, change: Callable[[Number], Number]) -> _Nested:
+def each(value: Any, change: Callable[[Number], Number]) -> Any:
     """The same tuple of tuples with `change` applied to every number."""
-    return _each(value, change)  # type: ignore[no-any-return]
+    return zipped(change, value)
 
 
-def _each(value: Any, change: Callable[[Number], Number]) -> Any:
-    if not isinstance(value, tuple):
-        return change(value)
-    parts = [_each(part, change) for part in value]
-    return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-
-
-def zipped(change: Callable[..., Number], first: _Nested, *others: Any) -> _Nested:
+def zipped(change: Callable[..., Number], first: Any, *others: Any) -> Any:
     """A tuple of tuples like the first, each number from those at its place in all."""
-    return _zipped(change, first, *others)  # type: ignore[no-any-return]
-
-
-def _zipped(change: Callable[..., Number], *values: Any) -> Any:
-    first = values[0]
     if not isinstance(first, tuple):
-        return change(*values)
-    parts = [_zipped(change, *group) for group in zip(*values, strict=True)]
+        return change(first, *others)
+    parts = [zipped(change, *group) for group in zip(first, *others, strict=True)]
     return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
 
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Accuracy, Courses, Place
 from trunnion.algebra.dual import primal
 from trunnion.algebra.panels import CANCELLED
-from trunnion.algebra.roots import root
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Coded, Status
@@ -35,7 +34,7 @@ from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.status import status_of
-from trunnion.solve.switches import MARGINS
+from trunnion.solve.switches import MARGINS, root
 from trunnion.solve.system import felt, law_of, scale_of
 
 if TYPE_CHECKING:

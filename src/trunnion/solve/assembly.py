@@ -36,7 +36,6 @@ from trunnion.solve.hints import (
     off_drawing,
     remarks,
     spun_sets,
-    undecided,
 )
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates
 from trunnion.solve.track import (
@@ -173,10 +172,10 @@ def _closed_form(walk: Forward, number: int, times: Array, drawn: int | None) ->
                 return Decision(branches[tied[0]], count, (), near)
     lane, frames = ways_of(walk, number, times)
     if count == 1 or not hinted:
-        said = [undecided(walk, module, count)] if count > 1 and named is None else []
+        said = remarks(walk, module, count, named) if count > 1 else []
         return Decision(branches[named or 0], count, said, lane or 0)
     tied = _tied(walk, distance(walk, module, frames, lane or 0)) if lane is not None else [0]
-    said = remarks(walk, module, count, frames, lane or 0, named, tied)
+    said = remarks(walk, module, count, named, tied)
     return Decision(branches[tied[0] if named is None else named], count, said, lane or 0)
 
 
@@ -243,7 +242,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
         rows[:, np.arange(count) != begin] = np.nan
         replace(follower, stride=1).both_ways(rows, begin, periodic)
     track = Track(times, rows, orientation, periodic, clock, turns, float(times[begin]), frames, chosen_set)
-    return Decision(track, ways, remarks(walk, module, ways, frames, begin, named, tied))
+    return Decision(track, ways, remarks(walk, module, ways, named, tied))
 
 
 def _drawn(

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.roots import root
 from trunnion.joints.friction import FrictionLaw
 from trunnion.solve.forward import Assembly, forward
+from trunnion.solve.switches import root
 from trunnion.solve.system import Cycle, System, Values, law_of, rubbing
 
 __all__ = ["History", "histories"]

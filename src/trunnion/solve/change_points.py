@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
-from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.spins import unspun
+from trunnion.groups.spatial import SpatialGroup, unspun
 from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.solve.forward import Forward, pose_of, posed

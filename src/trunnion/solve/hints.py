@@ -21,15 +21,14 @@ from trunnion.groups.tree import Element
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
 from trunnion.model.parts import AT, FOLDS
-from trunnion.results.quantities import quantity
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System
-from trunnion.solve.track import SAME, lane_of
+from trunnion.solve.track import lane_of
 from trunnion.structure.decompose import Module
 
 __all__ = [
     "coordinate", "distance", "drawn_at", "hinted_at", "hints", "joint_rows", "misnamed", "named_way", "off_drawing",
-    "remarks", "spun_sets", "undecided", "way_name",
+    "remarks", "spun_sets", "way_name",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -263,60 +262,38 @@ def off_drawing(walk: Forward, number: int, pose: Any, lane: int | NDArray[np.in
 # ---- what there is to say -------------------------------------------------------------------------------------
 
 
-def remarks(
-    walk: Forward, module: Module, count: int, frames: Any, lane: int, named: int | None, tied: Sequence[int]
-) -> list[Finding]:
-    """Of an assembly among `count` that is chosen by name, or as one of those that are nearest the hints."""
-    if named is None:
-        return [] if len(tied) == 1 else [undecided(walk, module, count, tied, frames, lane)]
-    links, places = list(module.links), [name for _, name, _ in hints(walk, module)]
-    if not places or len(tied) != 1 or tied[0] == named:
-        return []
-    key, (name, _) = next(iter(_names(walk.system, module).items()))
-    what = f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by the place of "
-    what += f"{', '.join(places)}, which means {way_name(tied[0])}; the name is used"
-    figures = {"links": links, "places": places, "way": way_name(tied[0]), "name": name}
-    return [Finding.warning("assembly.contradiction", f"assembly.{key}", what, "remove one of the two", **figures)]
-
-
-def undecided(
-    walk: Forward, module: Module, count: int, tied: Sequence[int] = (), frames: Any = (), lane: int = 0
-) -> Finding:
-    """Where neither a name nor a place decides: there is no hint, or one that does not tell the assemblies apart.
-
-    tied: those that it does not tell apart, of which the first is used; frames: of all assemblies, at a position.
-    """
-    system = walk.system
+def remarks(walk: Forward, module: Module, count: int, named: int | None, tied: Sequence[int] = ()) -> list[Finding]:
+    """Of an assembly among `count` that is chosen by name, or as the first of those that are nearest the hints, `tied`,
+    if there are any: where name and place contradict each other, and where neither decides."""
+    system, links = walk.system, list(module.links)
     hinted = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
+    if named is not None:
+        if not hinted or len(tied) != 1 or tied[0] == named:
+            return []
+        key, (name, _) = next(iter(_names(system, module).items()))
+        what = f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by the place of "
+        what += f"{', '.join(hinted)}, which means {way_name(tied[0])}; the name is used"
+        figures = {"links": links, "places": hinted, "way": way_name(tied[0]), "name": name}
+        return [Finding.warning("assembly.contradiction", f"assembly.{key}", what, "remove one of the two", **figures)]
+    if len(tied) == 1:
+        return []
     unhinted = [key for key in system.mechanism.assembly if key in module.joints and key not in hinted]
-    why, names = "no assembly hint selects one", hinted or unhinted
-    if names:
-        why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
+    why, used = "no assembly hint selects one", way_name(tied[0]) if tied else "the first one"
+    if names := hinted or unhinted:
         them = "them" if len(tied) in (0, count) else " and ".join(way_name(mode) for mode in tied)
+        why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
         why += f"{agreeing(len(names), 'does', 'do')} not distinguish {them}"
-        why += f": {agreeing(len(names), 'its place is', 'their places are')} the same in all" if not hinted else ""
-    rows = joint_rows(walk, module, count, frames, lane) if hinted else {}
-    for joint, (turned, numbers) in rows.items():  # where the first that tells them apart is in each of them
-        table = np.array(numbers)[:, tied]
-        size = float(np.max(primal(walk.size)))
-        compared = np.concatenate([np.cos(table), np.sin(table)]) if turned else table / size
-        if np.max(np.ptp(compared, axis=1)) > SAME:
-            places = [", ".join(quantity(part, "rad" if turned else "m") for part in place) for place in table.T]
-            brackets = "({})" if len(table) > 1 else "{}"
-            texts = [f"{brackets.format(place)} in {way_name(mode)}" for place, mode in zip(places, tied, strict=True)]
-            why += f": {joint} is at {', '.join(texts)}"
-            break
-    free = [joint for joint in module.joints if joint not in unhinted] or list(module.joints)
-    joint = module.joints[len(module.joints) // 2]
-    joint = joint if joint in free else free[0]
-    place, hint = "where a point is", f"{{{as_key(joint)}: [x, y]}}"
-    if system.spatial:
-        met = PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop
-        hint = f"{{{as_key(joint)}: {'[x, y, z]' if met else '60 deg'}}}"
-        place = place if met else "how far a joint has turned"
-    remedy = f"state roughly {place} at the start, e.g. assembly: {hint}, or one of the names listed by `check`"
-    if hinted:
-        remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
-    links, used = list(module.links), way_name(tied[0]) if tied else "the first one"
+    remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
+    if not hinted:
+        free = [joint for joint in module.joints if joint not in unhinted] or list(module.joints)
+        joint = module.joints[len(module.joints) // 2]
+        joint = joint if joint in free else free[0]
+        place, hint = "where a point is", "[x, y]"
+        if system.spatial and PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop:
+            hint = "[x, y, z]"
+        elif system.spatial:
+            place, hint = "how far a joint has turned", "60 deg"
+        remedy = f"state roughly {place} at the start, e.g. assembly: {{{as_key(joint)}: {hint}}}, or one of the names "
+        remedy += "listed by `check`"
     what = f"links {', '.join(links)} have {count} assembly modes and {why}; {used} is used"
-    return Finding.warning("assembly.choice", "assembly", what, remedy, links=links, ways=count)
+    return [Finding.warning("assembly.choice", "assembly", what, remedy, links=links, ways=count)]

@@ -5,6 +5,8 @@ friction and what resists a joint turn round where its relative speed does; a sp
 length; motion laws go from one function to the next. A number of the motion belongs to each of these, which passes a
 level there. They are looked for on a scan of the cycle - also where such a number only dips through its level between
 two places of it - and located to rounding. What no model states, such as a guide that tilts over, is not looked for.
+
+[C] T. R. Chandrupatla, Adv. Eng. Softw. 28 (1997) 145-149, doi:10.1016/S0965-9978(96)00051-8.
 """
 
 from __future__ import annotations
@@ -20,7 +22,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Accuracy
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.roots import root
 from trunnion.model.parts import Spring
 from trunnion.solve import loads
 from trunnion.solve.forward import Assembly, Forward, forward
@@ -28,8 +29,8 @@ from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
-    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "shifts_of",
-    "stated_bends", "tracked",
+    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "root",
+    "shifts_of", "stated_bends", "tracked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -48,6 +49,7 @@ SETTLED = 1e-11  # of the cycle
 SLOPED = 1e-6  # of the cycle: step of a difference
 CLOSE = 1e-10  # of the cycle: edges that are one
 NOISE = 1e-9  # of the largest value: zero but for rounding
+ROOT_ROUNDS = 60
 
 
 @dataclass(frozen=True)
@@ -348,3 +350,28 @@ def _located(every: _Crossing, number: Callable[[Array], Array], duration: Array
     """The times of all crossings."""
     low, high = every.at_low - every.level, every.at_high - every.level
     return root(lambda time: number(time) - every.level, every.low, every.high, low, high, SETTLED * duration)
+
+
+def root(
+    off: Callable[[Array], Array], low: Array, high: Array, at_low: Array, at_high: Array, settled: Array
+) -> Array:
+    """Where a number is 0 between two places at which it has other signs, by inverse quadratic interpolation where that
+    is sure to converge, else bisection [C]. at_low, at_high: the number there; settled: how near it is to be found."""
+    a, b, fa, fb = low.copy(), high.copy(), at_low, at_high
+    with np.errstate(all="ignore"):
+        share = np.clip(fa / (fa - fb), 0.0, 1.0)
+        for _ in range(ROOT_ROUNDS):
+            at = a + share * (b - a)
+            value = off(at)
+            same = np.sign(value) == np.sign(fa)
+            c, fc = np.where(same, a, b), np.where(same, fa, fb)
+            b, fb = np.where(same, b, a), np.where(same, fb, fa)
+            a, fa = at, value
+            if np.all((np.abs(b - a) <= settled) | (fa == 0) | (fb == 0) | np.isnan(fa)):
+                break
+            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+            sure = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
+            inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+            least = np.minimum(0.5, settled / np.abs(b - c))
+            share = np.clip(np.where(sure & np.isfinite(inverse), inverse, 0.5), least, 1 - least)
+    return np.where(np.abs(fa) <= np.abs(fb), a, b)

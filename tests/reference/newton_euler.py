@@ -55,8 +55,7 @@ class Joint:
 
     first, second: names of the bodies. point: global point at which the reaction acts and its moment counts. axes:
     columns x, y, z of the element on the second body; z is the axis, the direction of the slide, the normal of a planar
-    pair, the second pin of a universal one. other: the first pin of a universal joint. friction: wrench on the second
-    body. driven: an unknown effort along z.
+    pair. friction: wrench on the second body. driven: an unknown effort along z.
     """
 
     kind: str
@@ -64,8 +63,6 @@ class Joint:
     second: str | None
     point: ArrayLike
     axes: Vector
-    other: ArrayLike = (1.0, 0.0, 0.0)
-    pitch: float = 0.0
     friction: ArrayLike = 0.0
     driven: bool = False
 
@@ -85,23 +82,15 @@ class Solution:
 
 def wrenches(joint: Joint) -> tuple[list[Vector], Vector]:
     """What the joint can transmit for unit values of its unknowns, and its unit effort."""
-    none = np.zeros(3)
-    forces = [np.concatenate([n, none]) for n in joint.axes.T]
-    moments = [np.concatenate([none, n]) for n in joint.axes.T]
-    along, about = forces[2], moments[2]
-    cross = np.cross(np.asarray(joint.other, float), joint.axes[:, 2])
-    thread = along - joint.pitch / (2 * np.pi) * about  # no power: F_z ṡ + M_z θ̇ = 0 with ṡ = pitch θ̇/2π
+    forces = [np.append(n, np.zeros(3)) for n in joint.axes.T]
+    moments = [np.append(np.zeros(3), n) for n in joint.axes.T]
     table = {
-        "revolute": ([*forces, *moments[:2]], about),
-        "prismatic": ([*forces[:2], *moments], along),
-        "cylindrical": ([*forces[:2], *moments[:2]], about),
+        "revolute": ([*forces, *moments[:2]], moments[2]),
+        "cylindrical": ([*forces[:2], *moments[:2]], moments[2]),
         "spherical": (forces, np.zeros(6)),
-        "universal": ([*forces, np.concatenate([none, cross])], np.zeros(6)),
-        "helical": ([*forces[:2], thread, *moments[:2]], about),
         "planar": ([forces[2], *moments[:2]], np.zeros(6)),
-        "fixed": ([*forces, *moments], np.zeros(6)),
-        "pin": (forces[:2], about),  # these two of links that a planar pair each holds in their plane
-        "slot": ([forces[1], moments[0]], along),
+        "pin": (forces[:2], moments[2]),  # these two of links that a planar pair each holds in their plane
+        "slot": ([forces[1], moments[0]], forces[2]),
     }
     return table[joint.kind]
 
@@ -136,7 +125,7 @@ def left(bodies: Mapping[str, Body], joints: Mapping[str, Joint]) -> tuple[list[
         if body.free_spin is not None:
             spin = np.concatenate([np.zeros(3), np.asarray(body.free_spin, float)])
             unknowns.append((name, "spin", spin))
-            columns.append(effect(bodies, Joint("fixed", None, name, body.centre, np.eye(3)), spin))
+            columns.append(effect(bodies, Joint("spin", None, name, body.centre, np.eye(3)), spin))
     A = np.array(columns).T
     if A.shape[0] != A.shape[1]:
         raise ValueError(f"{A.shape[0]} equations but {A.shape[1]} unknowns: not determinate")
@@ -184,13 +173,12 @@ class Rubbing:
     """Friction of one bearing of a joint: its size is a function of the reaction, its direction is given.
 
     size: of (reaction force, moment) on the second body, N; wrench: friction on the second body for size 1, against
-    the slip. felt: the reaction it is a function of has the joint's own friction in it.
+    the slip.
     """
 
     joint: str
     size: Callable[[Vector, Vector], float]
     wrench: Vector
-    felt: bool = False
 
 
 def solve_with_friction(
@@ -242,7 +230,4 @@ def loads_of_bearings(
         for (name, what, unit), values in zip(unknowns, x, strict=True):
             if what == "reaction" and name == bearing.joint:
                 felt[row] += np.outer(unit, values)
-        for column, other in enumerate(rubbing, start=1):
-            if bearing.felt and other.joint == bearing.joint:
-                felt[row, :, column] += other.wrench
     return felt[..., 0], felt[..., 1:]

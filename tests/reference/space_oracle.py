@@ -7,16 +7,15 @@ of a bearing: Pezzuti et al. (2006), eqs. 15–19, and the vector sum in its pla
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from reference.maximal_space import SLIDING, Array, Data, Frame, Linkage, Motion, gap, turned
-from reference.newton_euler import Body, Joint, Load, Rubbing, Solution, solve, solve_with_friction
+from reference.newton_euler import Body, Joint, Load, Rubbing, Solution, solve_with_friction
 
 __all__ = ["Oracle", "Slip", "merged"]
 
-NONE = np.zeros(3)
 MATRIX = (("xx", "xy", "xz"), ("xy", "yy", "yz"), ("xz", "yz", "zz"))
 
 
@@ -96,7 +95,7 @@ class Oracle(Linkage):
         """Joints with friction (6) and what resists in them."""
         found = {}
         for name, data in self.joint.items():
-            one, two = self.elements(motions, name)
+            _, two = self.elements(motions, name)
             first, second = (None if link == "ground" else link for link in data["links"])
             axes = two.frame.axes
             middle = two.frame.place + data["pin"].get("offset", 0.0) * axes[:, 2]
@@ -105,92 +104,33 @@ class Oracle(Linkage):
                 if load.get("joint") == name:
                     known[3:] -= np.sign(slip.turn) * load.get("resisting_torque", 0.0) * axes[:, 2]
                     known[:3] -= np.sign(slip.slide) * load.get("resisting_force", 0.0) * axes[:, 2]
-            z, pitch, driven = one.frame.axes[:, 2], data.get("pitch", 0.0), name in self.drivers
-            found[name] = Joint(data["type"], first, second, middle, axes, z, pitch, known, driven)
+            found[name] = Joint(data["type"], first, second, middle, axes, known, name in self.drivers)
         return found
-
-    def balance(self, motions: Mapping[str, Motion], friction: Mapping[str, Array] | None = None) -> Solution:
-        """Reactions and efforts with given friction (6, on the second link about the middle of the bearing)."""
-        return solve(self.bodies(motions), self.joints_at(motions, friction or {}), self.gravity)
 
     def rub(self, motions: Mapping[str, Motion]) -> tuple[Solution, dict[str, Array]]:
         """Reactions, efforts and friction by its law."""
-        rubbing = [one for name in self.joint if self.coefficient(name) for one in self.rubbing(motions, name)]
+        rubbing = [self.rubbing(motions, name) for name in self.joint if self.coefficient(name)]
         return solve_with_friction(self.bodies(motions), self.joints_at(motions, {}), rubbing, self.gravity)
 
-    def rubbing(self, motions: Mapping[str, Motion], name: str) -> list[Rubbing]:
-        """The bearings of a joint."""
-        data, f = self.joint[name], self.coefficient(name)
-        kind, pin, guide = data["type"], data["pin"], data["guide"]
-        _, two = self.elements(motions, name)
-        z, slip, r = two.frame.axes[:, 2], self.slip(motions, name), float(pin.get("radius", 0.0))
-        length = float(pin.get("bearing", pin.get("length", np.inf)))
+    def rubbing(self, motions: Mapping[str, Motion], name: str) -> Rubbing:
+        """Friction against the slip: of a ball by its load, of a bearing or a guide by the loads of its two ends."""
+        kind, f, slip = self.joint[name]["type"], self.coefficient(name), self.slip(motions, name)
+        part = self.joint[name]["guide" if kind in SLIDING else "pin"]
+        r, length = float(part.get("radius", 0.0)), float(part.get("bearing", part.get("length", np.inf)))
+        z = self.elements(motions, name)[1].frame.axes[:, 2]
         if kind == "spherical":
-            return [against(name, lambda F, M: f * np.linalg.norm(F), spin=r * unit(slip.spin))]
+            spin = r * slip.spin / np.linalg.norm(slip.spin)
+            return Rubbing(name, lambda F, M: f * float(np.linalg.norm(F)), -np.append(np.zeros(3), spin))
+        turn, slide = r * np.sign(slip.turn), 0.0
         if kind in SLIDING:
-            long, width = float(guide["length"]), float(guide.get("width", np.inf))
-            return [
-                against(
-                    name, lambda F, M: f * (ends(F, M, z, long) + 2 * abs(M @ z) / width), slide=np.sign(slip.slide) * z
-                )
-            ]
-        if kind == "helical":
-            lead = data["pitch"] / (2 * np.pi * r)
-            c, s = 1 / np.hypot(1, lead), lead / np.hypot(1, lead)
-            sense = np.sign(slip.turn)
-            return [
-                against(
-                    name,
-                    lambda F, M: f * (abs(F @ z) / c + ends(F, M, z, length)),
-                    slide=sense * s * z,
-                    spin=sense * r * c * z,
-                )
-            ]
-        if kind == "universal":
-            return self._rubbing_cross(motions, name, f, r, length)
-        load = upper if data["friction"].get("model") == "pezzuti" else ends
-        if kind == "cylindrical" and load is upper:
-            turn, slide = np.sign(slip.turn) * r * z, np.sign(slip.slide) * z
+            turn, slide = 0.0, np.sign(slip.slide)
         elif kind == "cylindrical":
-            v = float(np.hypot(r * slip.turn, slip.slide))
-            turn, slide = r * (r * slip.turn / v) * z, slip.slide / v * z
-        else:
-            turn, slide = np.sign(slip.turn) * r * z, np.zeros(3)
-        return [against(name, lambda F, M: f * load(F, M, z, length), slide=slide, spin=turn)]
-
-    def _rubbing_cross(
-        self, motions: Mapping[str, Motion], name: str, f: float, r: float, length: float
-    ) -> list[Rubbing]:
-        """A universal joint: the pins of its massless cross, each across itself loaded by the friction of the other."""
-        one, two = self.elements(motions, name)
-        pins, relative = (one.frame.axes[:, 2], two.frame.axes[:, 2]), two.spin - one.spin
-
-        def pin(u: Array) -> Rubbing:
-            spin = np.sign(relative @ u) * r * u
-            return against(name, lambda F, M: f * ends(F, M, u, length), spin=spin, felt=True)
-
-        return [pin(u) for u in pins]
-
-
-def against(name: str, size: Any, slide: Any = NONE, spin: Any = NONE, felt: bool = False) -> Rubbing:
-    """Friction of one bearing against the slip: force `slide` and moment `spin` for size 1, turned round."""
-    return Rubbing(name, size, -np.concatenate([np.asarray(slide, float), np.asarray(spin, float)]), felt)
-
-
-def unit(a: Array) -> Array:
-    return a / np.linalg.norm(a)
-
-
-def across(a: Array, u: Array) -> Array:
-    return a - u * (u @ a)
+            v = np.hypot(r * slip.turn, slip.slide)
+            turn, slide = r * r * slip.turn / v, slip.slide / v
+        return Rubbing(name, lambda F, M: f * ends(F, M, z, length), -np.append(slide * z, turn * z))
 
 
 def ends(F: Array, M: Array, u: Array, length: float) -> float:
     """|Q₁| + |Q₂|: the load carried at the two ends of a bearing about u."""
-    half, g = across(F, u) / 2, np.cross(M, u) / length
+    half, g = (F - u * (u @ F)) / 2, np.cross(M, u) / length
     return float(np.linalg.norm(half - g) + np.linalg.norm(half + g))
-
-
-def upper(F: Array, M: Array, u: Array, length: float) -> float:
-    """|F| + 2 |M|/L across u: eqs. 17 and 19 of Pezzuti et al."""
-    return float(np.linalg.norm(across(F, u)) + 2 * np.linalg.norm(across(M, u)) / length)

@@ -119,7 +119,7 @@ def independent_shares(run: Run, data: Data, guide: float) -> Array:
             name: Drive(*(float(np.broadcast_to(n, STEPS)[i]) for n in numbers)) for name, numbers in drives.items()
         }
         motions = other.move(home, drive)
-        rubbing = [bearing for name in run.system.joints for bearing in other.rubbing(motions, name)]
+        rubbing = [other.rubbing(motions, name) for name in run.system.joints]
         felt.append(loads_of_bearings(other.bodies(motions), other.joints_at(motions, {}), rubbing, other.gravity))
     start, slope = (np.array(parts) for parts in zip(*felt, strict=True))
     slides = np.array([kind == "prismatic" for kind, _ in run.system.joints.values()])

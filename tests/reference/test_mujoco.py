@@ -53,7 +53,8 @@ def compared(run: Any, back: Any, engine: PlanarEngine, i: int) -> Iterator[tupl
     reactions, efforts = engine.forces()
     for joint, reaction in reactions.items():
         yield "force", back.reactions[joint][:2], reaction[:2]
-        yield "moment", back.reactions[joint][2:], reaction[2:]
+        at = engine.place(engine.joints[joint]["links"][1], joint)
+        yield "moment", back.reactions[joint][2:], [reaction[2] + at[0] * reaction[1] - at[1] * reaction[0]]
     for driver, effort in efforts.items():
         yield f"drive of {driver}", [back.efforts[driver]], [effort]
 

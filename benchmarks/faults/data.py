@@ -62,8 +62,8 @@ _STUDIES = (
     Fault(
         "play-scatter-of-another-dimension",
         "studies/tolerance/effects.py",
-        "square * len(q) / (len(q) + 2) * length(q)",
-        "square * len(q) / (len(q) + 1) * length(q)",
+        "square / (len(q) + 2) * length(q)",
+        "square / (len(q) + 1) * length(q)",
         ("tests/reference/test_play.py", "-k", "one_rule"),
     ),
     Fault(

@@ -307,15 +307,13 @@ def test_curve_of_cost_over_accuracy() -> None:
 
 
 def test_what_cannot_be_allocated() -> None:
-    grades = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
-    for model, choice, text in (
-        (grades, "continuous", "a table of processes, which is no continuous choice"),
-        (fourbar(costs={}), "auto", "no tolerance has a cost"),
-        (fourbar(measures={}), "auto", "no measure is stated"),
-        (fourbar(measures={"θ": {"angle": "rocker"}}), "auto", "none of the measures θ has a limit"),
+    for model, text in (
+        (fourbar(costs={}), "no tolerance has a cost"),
+        (fourbar(measures={}), "no measure is stated"),
+        (fourbar(measures={"θ": {"angle": "rocker"}}), "none of the measures θ has a limit"),
     ):
         with pytest.raises(MechanismError, match=text):
-            trunnion.allocate(model, choice=choice)
+            trunnion.allocate(model)
 
 
 def test_a_tolerance_without_effect_is_not_bounded_by_rounding() -> None:

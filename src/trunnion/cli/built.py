@@ -104,7 +104,6 @@ OF_ALLOCATION = (
     f"accuracy, {CURVES}."
 )
 Criterion = Literal["worst-case", "rss", "yield"]
-Choice = Literal["auto", "continuous", "discrete"]
 
 
 @verb(
@@ -115,7 +114,6 @@ Choice = Literal["auto", "continuous", "discrete"]
         "--yield", parser=share, metavar="SHARE",
         help="Required share within all limits, 0.99 or 99%; implies --criterion yield.",
     ),
-    choice="continuous, discrete, or auto: according to the stated costs.",
     exact="Exact worst case of the mechanism instead of the first-order one.",
     sure="The lower end of the 95 % interval of fresh samples has to meet the yield.",
     curve="Number of points of the cost-accuracy curve; 0: no curve.",
@@ -124,7 +122,7 @@ Choice = Literal["auto", "continuous", "discrete"]
 )  # fmt: skip
 def allocate(
     model: Model, files: Files, measure: list[str] | None = None, criterion: Criterion | None = None,
-    target: float | None = None, choice: Choice = "auto", exact: bool = False, sure: bool = False,
+    target: float | None = None, exact: bool = False, sure: bool = False,
     curve: int = 0, at: str | None = None, steps: int = 360, samples: int = 10_000, seed: int = 1,
     jobs: int | None = None, write: Path | None = None, force: bool = False, kind: str | None = None,
 ) -> None:  # fmt: skip
@@ -144,7 +142,7 @@ def allocate(
     mechanism = model.read()
     with model.lines(), bar("samples", samples, least=1000) as progress:
         result = run(
-            mechanism, measure, by, target, choice, steps, at, samples, seed,
+            mechanism, measure, by, target, steps, at, samples, seed,
             curve, exact=exact, sure=sure, jobs=jobs, progress=progress,
         )  # fmt: skip
     allocated, findings = bool(result.attrs["found"]), _named(findings_of(result), mechanism)

@@ -339,22 +339,19 @@ class Answer:
         return self.system.dial(self.values, self.time).intervals(places) if len(places) else ""
 
     def place(self, name: str) -> str:
-        """Where the largest need of a name is, among those of the positions: everywhere, if it is one number."""
+        """Where the largest need of a name is, in words: everywhere, if it is one number at all positions."""
         (need, time), needs = self.share if name == "needed_share" else self.clearance, self.arrays[name]
         if len(needs) > 1 and bool(np.all(np.isfinite(needs))) and need - float(np.min(needs)) <= SAME * need:
             return EVERYWHERE
-        return self.where(time)
-
-    def where(self, time: float) -> str:
-        """A time in words: the drive coordinate, if there is one."""
         dial = self.system.dial(self.values, np.array([time]))
-        return f"{dial.at(0)} of {dial.of}" if dial.of else dial.at(0)
+        return f"at {dial.at(0)} of {dial.of}" if dial.of else f"at {dial.at(0)}"
 
     def findings(self) -> Iterator[Finding]:
         """Where the clearances suffice and where not, and what would."""
         yield from self.notes
-        (share, time), need = self.share, self.clearance[0]
-        place, times = _at(self.place("needed_share")), f"{_share(share)} times their size is needed"
+        share, need = self.share[0], self.clearance[0]
+        place, digits = self.place("needed_share"), 4 if abs(share - 1) > 1e-3 else 10  # so many tell it from 1
+        times = f"{share:.{digits}g} times their size is needed"
         faults, figures = list[Finding](), {"share": share, "clearance": need}
         if at := self.at(AssemblyStatus.APART):
             remedy = "check the lengths, or limit the range of the driver"
@@ -363,9 +360,8 @@ class Answer:
             )
         short = self.at(AssemblyStatus.SHORT)
         if short or (np.isfinite(share) and share > ENOUGH):  # or only between the positions
-            takes = f"{times} {place}" if place == EVERYWHERE else f"{place} {times}"
-            takes = f"{short}: {takes}" if short else f"near {self.where(time)}: {times}"
-            what = f"the stated clearances are too small to close the loops {takes}"
+            within = f"{short}: " if short else ""
+            what = f"the stated clearances are too small to close the loops {within}{place} {times}"
             faults.append(Finding.error("assembly.clearance_short", "joints", what, self._remedy(), **figures))
         if at := self.at(AssemblyStatus.RIGID):
             angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
@@ -389,7 +385,7 @@ class Answer:
         if not np.isfinite(need):
             return "state a clearance of pins, an end float of pins without axial freedom, or correct the axes"
         size = f"{_enough(1e3 * need)} mm" if need >= 1e-4 else f"{_enough(1e6 * need)} um"
-        pins, place = "the pins " if self.pins else "", _at(self.place("needed_clearance"))
+        pins, place = "the pins " if self.pins else "", self.place("needed_clearance")
         return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed {place}"
 
     def summary(self) -> list[Figure]:
@@ -405,11 +401,12 @@ class Answer:
         if angle > 0 or length > 0:
             figures = [figure for figure, size in zip(figures, (angle, length), strict=True) if size > 0]
         if self.played:
-            # what six digits show as 1 is shown with as many as distinguish it from 1
-            needed = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else share
+            needed = f"{share:.10g}" if f"{share:.6g}" == "1" else "∞" if np.isinf(share) else share
             figures.append(Figure("largest_share", "needed share of the stated clearances", needed))
             if 0 < share < np.inf:
-                figures.append(Figure("largest_share.place", "  at", self.place("needed_share"), ""))
+                figures.append(
+                    Figure("largest_share.place", "  at", self.place("needed_share").removeprefix("at "), "")
+                )
         subject = f"smallest clearance, the same in {self.of}"
         figures.append(Figure("smallest_clearance", subject, 1e3 * need, "mm"))
         if 0 < need < np.inf:
@@ -417,7 +414,9 @@ class Answer:
             parts = self.arrays["uniform_part"][:, :, largest].sum(axis=1)
             carried = sorted(zip(parts, self.system.joints, strict=True), reverse=True)
             text = ", ".join(f"{name} {100 * part:.0f} %" for part, name in carried if part > LEAST_PART)
-            figures.append(Figure("smallest_clearance.place", "  at", self.place("needed_clearance"), ""))
+            figures.append(
+                Figure("smallest_clearance.place", "  at", self.place("needed_clearance").removeprefix("at "), "")
+            )
             figures.append(Figure("smallest_clearance.parts", "  share of each joint's clearance", text, ""))
         return figures
 
@@ -439,18 +438,6 @@ def _dataset(answer: Answer) -> xr.Dataset:
     along["time"].attrs["long_name"] = "time"
     variables = described({name: answer.arrays[name] for name in FIGURES}, FIGURES, member_units(system))
     return dataset_of("assembly", variables, _labels(system), attributes, along)
-
-
-def _at(place: str) -> str:
-    return place if place == EVERYWHERE else f"at {place}"
-
-
-def _share(share: float) -> str:
-    """Four digits, or as many as it takes to tell it from 1; ∞."""
-    if np.isinf(share):
-        return "∞"
-    texts = (f"{share:.{digits}g}" for digits in range(4, 11))
-    return next((text for text in texts if float(text) != 1), "1")
 
 
 def _enough(size: float) -> str:

@@ -142,14 +142,19 @@ def design(mechanism: Mechanism) -> Design:
     """
     run = _planar(mechanism)
     motion, driver = _motion(run), next(iter(mechanism.drivers), "")
-    angles = motion.named("pressure angle")
+    angles, extremes = motion.named("pressure angle"), dict[str, Extremes]()
+    for name, row in angles.items():
+        low, high = (motion.extreme([row], lambda rows: rows[0], motion.assembled, sign) for sign in (-1.0, 1.0))
+        times = [0.0 if place.everywhere else place.time for place in (low, high)]
+        at = [_coordinate(run, time % run.cycle.duration if run.cycle.periodic else time) for time in times]
+        extremes[name] = Extremes(low.value, at[0], high.value, at[1])
     largest = {name: motion.extreme([row], magnitude, motion.assembled).value for name, row in angles.items()}
     force, moment = (
         motion.extreme(motion.rows(kind), magnitude, motion.sound).value for kind in ("shaking force", "shaking moment")
     )
     return Design(
         grashof(mechanism, run), {name: np.pi / 2 - angle for name, angle in largest.items()},
-        {name: _extremes(run, motion, row) for name, row in angles.items()}, dead_centres(run), limits(run),
+        extremes, dead_centres(run), limits(run),
         force, moment, *(motor(run, driver) if driver else Motor()), motion.mean_speed() if driver else 0.0,
     )  # fmt: skip
 
@@ -170,14 +175,6 @@ def transmission_angles(walk: Forward) -> dict[str, Array]:
     RPP: between the two guides.
     """
     return {name: np.pi / 2 - np.abs(angle) for name, angle in pressure_angles(walk).items()}
-
-
-def _extremes(run: Run, motion: _Motion, row: int) -> Extremes:
-    """Extremes of a pressure angle, with the drive coordinates where they are."""
-    low, high = (motion.extreme([row], lambda rows: rows[0], motion.assembled, sign) for sign in (-1.0, 1.0))
-    times = [0.0 if place.everywhere else place.time for place in (low, high)]
-    places = [_coordinate(run, time % run.cycle.duration if run.cycle.periodic else time) for time in times]
-    return Extremes(low.value, places[0], high.value, places[1])
 
 
 def shaking(walk: Forward) -> tuple[tuple[Number, Number], Number]:

@@ -144,13 +144,11 @@ def sweep(
             arrays[name][place] = value
         if progress:
             progress(done)
-    findings = [*_answers(points.swept, arrays), *_shared(points)]
+    findings = _with_bare(mechanism, points.swept, [*_findings(points, watched.values(), arrays)])
     if others := [name for name in mechanism.measures if name not in measures]:
         what = f"not in this sweep: {agreeing(len(others), 'measure', 'measures')} {', '.join(others)} of the model"
         remedy = "add with --measure, in Python with measures=[…]"
         findings.append(Finding.note("sweep.measures_left_out", "measures", what, remedy, measures=others))
-    findings = _with_bare(mechanism, points.swept, findings)
-    findings += _undefined(points, watched.values(), arrays)
     if not points.erring:
         of_errors = {name for name, variable in FIGURES.items() if variable.part == "errors"}
         arrays = {name: array for name, array in arrays.items() if name not in of_errors}
@@ -178,45 +176,37 @@ def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], findings: list[Find
 # ---- what there is to say -------------------------------------------------------------------------------------
 
 
-def _shared(points: Points) -> Iterator[Finding]:
-    """What the points have to say that were looked at by themselves, each once; notes only if all have them."""
-    total, looked = int(np.prod(points.shape)), len(points.looked)
-    all_points = counted(total, "point") if looked == total else f"{counted(looked, 'point')} looked at"
+def _findings(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
+    """Points without figures, an efficiency, or a measure; what points have to say that were looked at by themselves,
+    each once, and notes only if all have them."""
+    status, names = arrays["status"], " and ".join(number.name for number in points.swept)
+
+    def places(mask: NDArray[np.bool_]) -> tuple[str, str, dict[str, Any]]:
+        """How many points of the grid are meant, and where the first is, in words and as figures."""
+        where = np.argwhere(mask)
+        first = say(points.swept, where[0].tolist())
+        of = f"{len(where):,} of {counted(mask.size, 'point')}"
+        return of, f"the first at {first}", {"points": len(where), "of": mask.size, "at": first}
+
+    remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
+    for code in Status:
+        mask = status == code
+        if not code.solved and mask.any():
+            (of, first, figures), missing = places(mask), int(arrays["without_answer"][mask][0])
+            where = f"{counted(missing, 'position')} not solved" if missing else "between the positions"
+            what = f"{of} {agreeing(figures['points'], 'has', 'have')} no result, {first} ({where}): {code.text}"
+            yield Finding.error("sweep.no_answer", names, what, remedy, **figures, positions=missing, status=code.text)
+    looked = len(points.looked)
+    all_points = f"{counted(looked, 'point')}{' looked at' * (looked < status.size)}"
     for by_point in points.said.values():
         finding, count = next(iter(by_point.values())), len(by_point)
         if count == looked:
             yield finding
         elif finding.severity is not Severity.NOTE:
             yield replace(finding, what=f"{finding.what} (at {count:,} of {all_points})")
-
-
-def _places(swept: Sequence[Swept], mask: NDArray[np.bool_]) -> tuple[str, str, dict[str, Any]]:
-    """How many points of the grid are meant, and where the first is, in words and as figures."""
-    where = np.argwhere(mask)
-    first = say(swept, tuple(int(i) for i in where[0]))
-    of = f"{len(where):,} of {counted(mask.size, 'point')}"
-    return of, f"the first at {first}", {"points": len(where), "of": mask.size, "at": first}
-
-
-def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """An error for every status that leaves points without figures."""
-    status, names = arrays["status"], " and ".join(number.name for number in swept)
-    remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
-    for code in Status:
-        mask = status == code
-        if code.solved or not mask.any():
-            continue
-        (of, first, figures), missing = _places(swept, mask), int(arrays["without_answer"][mask][0])
-        where = f"{counted(missing, 'position')} not solved" if missing else "between the positions"
-        what = f"{of} {agreeing(figures['points'], 'has', 'have')} no result, {first} ({where}): {code.text}"
-        yield Finding.error("sweep.no_answer", names, what, remedy, **figures, positions=missing, status=code.text)
-
-
-def _undefined(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """Points with an answer that have no efficiency, and measures of a motion in time that have no value there."""
-    undefined = (arrays["status"] < Status.NOT_CONVERGED) & np.isnan(arrays["efficiency"])
+    undefined = (status < Status.NOT_CONVERGED) & np.isnan(arrays["efficiency"])
     if np.any(undefined):
-        of, first, figures = _places(points.swept, undefined)
+        of, first, figures = places(undefined)
         why, remedy = "the drivers supply no net work", "see the mean powers there"
         if not has_useful_work(points.mechanism):
             why, remedy = NOTHING_USEFUL, STATE_USEFUL
@@ -225,7 +215,7 @@ def _undefined(points: Points, watched: Iterable[Measure], arrays: Mapping[str, 
     for measure in watched:
         mask = ~np.isfinite(arrays[measure.name])
         if measure.in_time and mask.any():
-            of, first, figures = _places(points.swept, mask)
+            of, first, figures = places(mask)
             what = f"{measure.name} has no value at {of}, {first}: {not_steady(points.run, measure)}"
             yield Finding.warning("sweep.not_steady", f"measures.{measure.name}", what, LONGER, **figures)
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -59,7 +58,6 @@ def allocate(
     measures: Sequence[str] | None = None,
     criterion: Criterion = "worst-case",
     target: float | None = None,
-    choice: Literal["auto", "continuous", "discrete"] = "auto",
     steps: int = 360,
     at: float | str | None = None,
     samples: int = DEFAULT_SAMPLES,
@@ -83,8 +81,6 @@ def allocate(
     criterion, target
         One of `Criterion`: worst-case, rss, or yield, of which target is the share of mechanisms within all limits,
         0.9973 if not given; with another criterion it is an error.
-    choice
-        continuous, discrete, or auto: discrete where any cost is a list of processes or options.
     steps, at
         Positions of a whole cycle; the place of measures that state none.
     samples, seed, jobs
@@ -125,10 +121,6 @@ def allocate(
     start = study(mechanism.with_tolerances(absent), names, at, friction_method)
     prices, notes = _prices(start)
     before = {**_stated(start, prices), **{path: 0.0 for path in absent if path in prices}}
-    listed = next((path for path, price in prices.items() if price.choices), "")
-    if listed and choice == "continuous":
-        what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
-        raise MechanismError(Finding(what, f"costs.{listed}", remedy))
     varying = start.inputs.names
     rounds = _Rounds(
         mechanism, varying, names, criterion, share, at, samples, seed, friction_method, jobs, sure, prices
@@ -147,7 +139,7 @@ def allocate(
     what = "the measure has no first-order result: its limits were ignored in the allocation"
     remedy = "check with the samples whether they are met"
     notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in settled.rows.unknown]
-    kind = "discrete" if listed or choice == "discrete" else "continuous"
+    kind = "discrete" if any(price.choices for price in prices.values()) else "continuous"
     notes += settled.findings
     allocated = Allocated(criterion, share, settled.study, settled.rows, answer, kind, prices, before, notes, offers)
     methods: list[Method] = ["linear"]
@@ -229,9 +221,9 @@ def _prices(study: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
         elif price.path in tolerances and tolerances[price.path].direction:
             what = "its direction is arbitrary, so the tolerance has no middle"
         elif price.path in tolerances:
-            values = mechanism.parameters(deviations={price.path: Dual(0.0, 1.0)})
-            plays = {joint: inputs.play(joint, values) for joint in inputs.loose}
-            moved = [joint for joint, play in plays.items() if any(np.any(derivative(r)) for r in play.radii)]
+            i = inputs.names.index(price.path)
+            plays = {joint: inputs.play(joint, inputs.duals).radii for joint in inputs.loose}
+            moved = [joint for joint, radii in plays.items() if any(inputs.derivatives(r)[i] for r in radii)]
             if moved:
                 instead = f"state pin.clearance and a cost of {moved[0]}.clearance instead"
                 what = f"it changes the play of {', '.join(moved)}; {instead}"

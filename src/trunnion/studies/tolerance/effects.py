@@ -69,22 +69,11 @@ def _along(vector: Vector, direction: float) -> Array:
 
 
 class Pin(NamedTuple):
-    """A pin anywhere in its hole: its load Q at every end, (component, …), and of each end the largest radius ϱ and
-    E ρ², ρ being the radius of a sample."""
+    """A pin anywhere in its hole: its load Q at every end, (component, …), its worst case and standard deviation."""
 
     loads: Sequence[Vector]
-    rooms: Sequence[tuple[float, float]]
-
-    @property
-    def worst(self) -> Array:
-        """Σ ϱ |Q| over the ends."""
-        return np.asarray(np.sum([most * length(q) for q, (most, _) in zip(*self, strict=True)], axis=0), float)
-
-    @property
-    def deviation(self) -> Array:
-        """Standard deviation, every place in each end as likely as any other: E|c|² = E ρ² n/(n + 2), n components."""
-        parts = [square * len(q) / (len(q) + 2) * length(q) ** 2 / len(q) for q, (_, square) in zip(*self, strict=True)]
-        return np.asarray(np.sqrt(np.sum(parts, axis=0)), float)
+    worst: Array
+    deviation: Array
 
 
 class EffectRow(NamedTuple):
@@ -128,21 +117,15 @@ class Effects:
         values = self.inputs.run.system.mechanism.parameters(deviations=deviations)
         for joint in self.inputs.held:
             values.update(self.inputs.seat(joint, values))
-        for path, offset in self._rims(values, at).items():
-            seats[path] = seats.get(path, 0.0) + offset
-        return {**values, **seats}
-
-    def _rims(self, values: Mapping[str, Number], at: Mapping[str, float]) -> dict[str, Number]:
-        """Offsets of pins of which `at` says where in their holes they lie, as shares of the radius."""
-        offsets: dict[str, Number] = {}
+        # pins of which `at` says where in their holes they lie, as shares of the radius
         for joint in self.inputs.loose if any(path.startswith(SHARE) for path in at) else ():
             play = self.inputs.play(joint, values)
             for path in (f"{carrier}.{joint}" for carrier in self.inputs.carriers(joint)):
                 for end, radius in zip(play.model.ends, play.radii, strict=True):
                     room = namespace(radius).maximum(radius, 0.0)
-                    for key in end:
-                        offsets[f"{path}.{key}"] = room * at.get(f"{SHARE}{path}.{key}", 0.0)
-        return offsets
+                    for key in (f"{path}.{part}" for part in end):
+                        seats[key] = seats.get(key, 0.0) + room * at.get(f"{SHARE}{key}", 0.0)
+        return {**values, **seats}
 
     def slopes(self, number: Number, shape: tuple[int, ...]) -> tuple[Array, Array]:
         """Primal and derivative of a result, (row, …)."""
@@ -230,23 +213,17 @@ class Effects:
     @cached_property
     def rooms(self) -> dict[str, list[tuple[float, float]]]:
         """Of every end of every play: largest radius within the tolerances, and E ρ², m²."""
-        tolerances = self.inputs.tolerances
-        seeds = np.eye(len(tolerances))[:, :, None] if tolerances else np.zeros((0, 1, 1))
-        values = self.inputs.run.system.mechanism.parameters(
-            deviations={tolerance.path: Dual(0.0, seeds[i]) for i, tolerance in enumerate(tolerances)}
-        )
+        tolerances, count = self.inputs.tolerances, len(self.inputs.tolerances)
         population, rooms = self.inputs.population, dict[str, list[tuple[float, float]]]()
         lower, upper = (np.array([getattr(each, end) for each in tolerances]) for end in ("lower", "upper"))
         for joint in self.inputs.loose:
             rooms[joint] = []
-            for radius in self.inputs.play(joint, values).radii:
+            for radius in self.inputs.play(joint, self.inputs.duals).radii:
                 start = float(np.ravel(primal(radius))[0])
-                slope = np.ravel(derivative(radius)) * np.ones(len(tolerances))
+                slope = self.inputs.derivatives(radius)[:count]
                 most = start + float(np.sum(np.maximum(slope * lower, slope * upper)))
-                mean, variance = (
-                    start + float(slope @ population.means),
-                    float(np.sum((slope * population.deviations) ** 2)),
-                )
+                mean = start + float(slope @ population.means)
+                variance = float(np.sum((slope * population.deviations) ** 2))
                 rooms[joint].append((max(most, 0.0), max(mean, 0.0) ** 2 + variance))
         return rooms
 
@@ -417,11 +394,14 @@ class FirstOrder:
     def plays(self, i: int) -> list[Pin]:
         """A pin in its hole, for each link that may carry its seat."""
         joint = self.effects.joint(i)
-        ends, pins = self.inputs.ends(joint), []
+        pins, rooms = [], self.effects.rooms[joint]
         for carrier in self.inputs.carriers(joint):
             rows = iter(self.effects.places[i, carrier])
-            loads = [np.array([self.slope[next(rows)] for _ in end]) for end in ends]
-            pins.append(Pin(loads, self.effects.rooms[joint]))
+            loads = [np.array([self.slope[next(rows)] for _ in end]) for end in self.inputs.ends(joint)]
+            worst = np.sum([most * length(q) for q, (most, _) in zip(loads, rooms, strict=True)], axis=0)
+            # every place in each end as likely as any other: E|c|² = E ρ² n/(n + 2), n components
+            parts = [square / (len(q) + 2) * length(q) ** 2 for q, (_, square) in zip(loads, rooms, strict=True)]
+            pins.append(Pin(loads, np.asarray(worst, float), np.sqrt(np.sum(parts, axis=0))))
         return pins
 
 

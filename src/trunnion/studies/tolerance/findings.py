@@ -56,7 +56,7 @@ class Outcome:
 
 
 def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dial: Any) -> Iterator[Figure]:
-    """Of each measure: nominal figure, worst case, RSS, scatter, yield, and what contributes most."""
+    """Of each measure: nominal figure, worst case, RSS, scatter and yield."""
     run = outcome.study.run
     alone = ", without correlation" if outcome.study.effects.correlated else ""
     for i, (of, unit) in enumerate(zip(outcome.study.orders, units, strict=True)):
@@ -82,24 +82,11 @@ def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dia
                 figures += [("yield", "yield", "1"), ("yield_low", low, "1"), ("cpk", "C_pk", "1")]
             for key, text, figure_unit in figures:
                 yield Figure(f"{name}.{key}", f"{name}, {text}", sampled[key][i], figure_unit)
-        yield from _contributions(outcome, of)
     if sampled is not None:
         if len(units) > 1:
             yield Figure("yield", "yield, all measures", sampled["yield_all"])
         yield Figure("samples", "samples", int(sampled["samples"]))
         yield Figure("samples_failed", "samples not solved", np.sum(sampled["failed"]))
-
-
-def _contributions(outcome: Outcome, of: MeasureOrder) -> Iterator[Figure]:
-    """The number that contributes most, by RSS and, of correlated numbers, by variance."""
-    name, deviation, halves = of.measure.name, float(of.total.deviation), np.nan_to_num(of.figure.spread.half) ** 2
-    shares = {"rss": (halves / np.sum(halves), "share of RSS²")} if np.sum(halves) > 0 else {}
-    if outcome.study.effects.correlated and deviation > 0:
-        shares["variance"] = of.figure.covariances / deviation**2, "share of the variance"
-    for key, (parts, share) in shares.items():
-        top = int(np.argmax(parts))
-        subject = f"{name}, largest contribution, {outcome.study.inputs.names[top]}, {share}"
-        yield Figure(f"{name}.contribution_{key}", subject, parts[top])
 
 
 def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:

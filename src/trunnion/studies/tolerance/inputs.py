@@ -93,22 +93,29 @@ class Inputs:
         return self.tolerances[i].direction or self.tolerances[i].path
 
     @cached_property
-    def turned(self) -> dict[int, int]:
-        """Of each toleranced number that changes the size of what points anywhere, which of them is the direction."""
-        angles = [i for i, each in enumerate(self.tolerances) if each.direction or each.distribution == FULL_TURN]
-        if not angles:
-            return {}
+    def duals(self) -> dict[str, Number]:
+        """Every number with its derivatives by all toleranced numbers, then by the angle that each is or goes with."""
         count = len(self.tolerances)
         seeds = np.eye(2 * count)[:, :, None]
         deviations = {tolerance.path: Dual(0.0, seeds[i]) for i, tolerance in enumerate(self.tolerances)}
-        for i in angles:  # the angle of a run-out is no toleranced number
-            path, seed = self.angle(i), Dual(0.0, seeds[count + i])
-            deviations[path] = deviations[path] + seed if path in deviations else seed
-        values = self.run.system.mechanism.parameters(deviations=deviations)
+        for i, each in enumerate(self.tolerances):  # the angle of a run-out is no toleranced number
+            if each.direction or each.distribution == FULL_TURN:
+                path, seed = self.angle(i), Dual(0.0, seeds[count + i])
+                deviations[path] = deviations[path] + seed if path in deviations else seed
+        return self.run.system.mechanism.parameters(deviations=deviations)
 
-        def moves(number: Number, i: int) -> bool:
-            return bool(np.any(np.broadcast_to(np.asarray(derivative(number), float), (2 * count, 1))[i]))
+    def derivatives(self, number: Number) -> Array:
+        """The derivatives of one of `duals`, or of what follows from them, (2 × number,)."""
+        return np.broadcast_to(np.asarray(derivative(number), float), (2 * len(self.tolerances), 1))[:, 0]
 
+    @cached_property
+    def turned(self) -> dict[int, int]:
+        """Of each toleranced number that changes the size of what points anywhere, which of them is the direction."""
+        angles = [i for i, each in enumerate(self.tolerances) if each.direction or each.distribution == FULL_TURN]
+        count = len(self.tolerances)
+        if not angles:
+            return {}
+        values = self.duals
         # sizes, and the path of the direction they point in: of misaligned axes and of seats that are given
         directed: list[tuple[Sequence[Number], str]] = []
         for joint in self.run.system.joints:
@@ -122,8 +129,8 @@ class Inputs:
             directed += [(self.play(joint, values).radii, angle) for angle in seats if angle in values]
         directions: dict[int, int] = {}
         for sizes, towards in directed:
-            turning = [i for i in angles if moves(values[towards], count + i)]
-            numbers = [i for i in range(count) if i not in angles and any(moves(size, i) for size in sizes)]
+            turning = [i for i in angles if self.derivatives(values[towards])[count + i]]
+            numbers = [i for i in range(count) if i not in angles and any(self.derivatives(size)[i] for size in sizes)]
             directions.update({i: turning[0] for i in numbers if turning})
         return directions
 

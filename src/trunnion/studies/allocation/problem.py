@@ -33,7 +33,6 @@ __all__ = [
     "Criterion",
     "RowEffects",
     "SampledYield",
-    "Trial",
 ]
 
 Array = NDArray[np.float64]
@@ -161,14 +160,6 @@ class SampledYield(NamedTuple):
     high: float
 
 
-class Trial(NamedTuple):
-    """One allocation that was sampled on the way to a yield."""
-
-    z: float
-    cost: float
-    sampled: SampledYield
-
-
 @dataclass(frozen=True)
 class Answer:
     """Half widths to buy, or why there are none (`findings` with an error, NaN).
@@ -177,7 +168,7 @@ class Answer:
     gap: cost minus bound, a share of the cost that tolerances change. price: what one more unit (rad, m, …) of a row's
     room would save, (row,); NaN for a discrete choice. choices: names of the options taken.
     Of a yield: expected, of normal deviations, linearly; sampled, by those samples that chose the margin; checked, by
-    fresh ones, which had no part in it; trials: all margins that were tried.
+    fresh ones, which had no part in it.
     """
 
     problem: AllocationProblem
@@ -191,7 +182,6 @@ class Answer:
     expected: float = np.nan
     sampled: SampledYield | None = None
     checked: SampledYield | None = None
-    trials: tuple[Trial, ...] = ()
 
     @property
     def cost(self) -> float:

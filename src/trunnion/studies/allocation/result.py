@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +38,7 @@ DEFAULT_YIELD = 0.9973
 CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought
 TWICE = 2.0  # so many rejects as an RSS stands for are an error
 ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
-M, P, T = ("measure",), ("parameter",), ("trial",)
+M, P = ("measure",), ("parameter",)
 VARIABLES: dict[str, Variable] = {
     "tolerance": Variable(P, "parameter", "half width found; of a clearance the radial clearance; else as stated"),
     "bought": Variable(P, "1", "1 if the tolerance has a cost and was chosen, 0 if it stays as stated"),
@@ -63,13 +63,6 @@ VARIABLES: dict[str, Variable] = {
     "yield_checked": Variable((), "1", "share within all limits of fresh samples, which had no part in the choice"),
     "yield_checked_low": Variable((), "1", "yield of the fresh samples, lower end of the 95 % interval"),
     "yield_checked_high": Variable((), "1", "yield of the fresh samples, upper end of the 95 % interval"),
-    "trial_margin": Variable(
-        T, "1", "margin of the limits in a trial, in standard deviations; the mean over the measures"
-    ),
-    "trial_cost": Variable(T, "1", "cost of a trial"),
-    "trial_yield": Variable(T, "1", "share of the samples within all limits in a trial"),
-    "trial_yield_low": Variable(T, "1", "yield of a trial, lower end of the 95 % interval"),
-    "trial_yield_high": Variable(T, "1", "yield of a trial, upper end of the 95 % interval"),
     "trade_off_factor": Variable(("offer",), "1", "common factor of all limits"),
     "trade_off_cost": Variable(("offer",), "1", "minimum cost for such limits; NaN if infeasible"),
     "trade_off_tolerance": Variable(("offer", "parameter"), "parameter", "half widths of least cost of such limits"),
@@ -199,8 +192,8 @@ def _by_measure(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
 
 
 def _totals(allocated: Allocated) -> Mapping[str, Any]:
-    """What is of all tolerances together, of the trials and of the curve of cost over accuracy."""
-    answer, before, rows = allocated.answer, allocated.before, allocated.rows
+    """What is of all tolerances together, and of the curve of cost over accuracy."""
+    answer, before = allocated.answer, allocated.before
     arrays: dict[str, Any] = {
         "cost_total": answer.cost,
         "cost_total_before": sum(_cost_of(price, before[name]) for name, price in allocated.prices.items()),
@@ -212,12 +205,6 @@ def _totals(allocated: Allocated) -> Mapping[str, Any]:
     ends = ("", "_low", "_high")
     if answer.checked is not None:
         arrays |= {f"yield_checked{end}": share for end, share in zip(ends, answer.checked, strict=True)}
-    if answer.trials:
-        first = np.unique(rows.measure, return_index=True)[1]
-        margins = [replace(answer.problem, z=trial.z).margins()[first] for trial in answer.trials]
-        arrays |= {"trial_margin": np.mean(margins, axis=1), "trial_cost": [trial.cost for trial in answer.trials]}
-        shares = np.array([trial.sampled for trial in answer.trials]).T
-        arrays |= {f"trial_yield{end}": share for end, share in zip(ends, shares, strict=True)}
     if allocated.offers:
         arrays["trade_off_factor"] = [factor for factor, _ in allocated.offers]
         arrays["trade_off_cost"] = [offer.cost for _, offer in allocated.offers]

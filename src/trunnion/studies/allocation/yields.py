@@ -18,7 +18,7 @@ from scipy.special import chdtr, ndtr, ndtri
 
 from trunnion.errors import Finding, Severity
 from trunnion.statistics.draws import factor, sobol
-from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield
 from trunnion.studies.allocation.solve import cheapest
 
 __all__ = ["Verify", "meet", "normal_yield"]
@@ -73,7 +73,7 @@ def meet(problem: AllocationProblem, target: float, verify: Verify | None = None
         return answer
     if verify is None:
         reckoned = answer.sampled or UNKNOWN
-        return _judged(replace(answer, sampled=None, trials=()), target, reckoned, sure)
+        return _judged(replace(answer, sampled=None), target, reckoned, sure)
     chosen = _Margins(problem, lambda tolerances: verify(tolerances, 0), sure)
     goal = target
     for number in range(1, CHECKS + 1):
@@ -141,9 +141,7 @@ class _Margins:
         levels = [self.level(answer.sampled or UNKNOWN) for answer in feasible]
         enough = [answer for answer, level in zip(feasible, levels, strict=True)
                   if _score(level) >= _score(goal) - ROUNDING]  # fmt: skip
-        answer = min(enough, key=lambda each: each.cost) if enough else feasible[int(np.argmax(levels))]
-        trials = [Trial(z, each.cost, each.sampled) for z, each in self.answers.items() if each.sampled]
-        return replace(answer, trials=tuple(trials))
+        return min(enough, key=lambda each: each.cost) if enough else feasible[int(np.argmax(levels))]
 
     def at(self, z: float) -> Answer:
         """The cheapest answer with a margin, and its yield."""

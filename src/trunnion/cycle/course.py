@@ -359,7 +359,7 @@ class _Looking:
 
     def bends(self) -> list[float]:
         """Times, s, at which rows may jump or bend."""
-        bends = [*([] if self.ideal else self.run.bends), *(self.run.ideal_bends if self.run.erring else [])]
+        bends = [*([] if self.ideal else self.run.bends), *(self.run.ideal.bends if self.run.erring else [])]
         return [*(bend.time for bend in bends), *(self.seats.breaks if self.seats else ())]
 
     def solved(self, time: Array) -> tuple[Backward, NDArray[np.bool_]]:
@@ -367,14 +367,14 @@ class _Looking:
         if self.seats:
             seated = self.seats.at(time, self.method)
             return seated.back, seated.valid
-        return (self.run.ideal if self.ideal else self.run.solve)(time, method=self.method), np.ones(time.shape, bool)
+        return (self.run.ideal if self.ideal else self.run).solve(time, method=self.method), np.ones(time.shape, bool)
 
     def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
         """Rows and statuses at times, s."""
         back, valid = self.solved(time)
         arrays = self._filled(back, time)
         if self.errs:
-            meant = self._filled(self.run.ideal(time, self.method), time)
+            meant = self._filled(self.run.ideal.solve(time, method=self.method), time)
             fill_errors(arrays, meant, self.run.system, slice(None))
         if self.seats:
             self._stand_in(arrays, meant, valid)

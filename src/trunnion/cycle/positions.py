@@ -204,7 +204,7 @@ def _fill(arrays: Arrays, run: Run, time: Array, window: slice, method: Friction
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     if run.erring:
         meant = allocate(run.system, len(time), wanted=COMPARED)
-        fill_chunk(meant, run.ideal(time, replace(method, margin_up_to=0.0)), slice(None))
+        fill_chunk(meant, run.ideal.solve(time, method=replace(method, margin_up_to=0.0)), slice(None))
         fill_errors(arrays, meant, run.system, window)
 
 
@@ -216,9 +216,9 @@ def _compiled(arrays: Arrays, run: Run, time: Array, method: FrictionMethod, cau
     kernel.fill(arrays, run.values, time, causes)
     if run.erring:
         meant, quick = allocate(run.system, len(time), wanted=COMPARED), replace(method, margin_up_to=0.0)
-        ideal = kernel_of(run, "compiled", run.ideal_values, time, meant, quick)
+        ideal = kernel_of(run, "compiled", run.ideal.values, time, meant, quick)
         assert ideal is not None
-        ideal.fill(meant, run.ideal_values, time)
+        ideal.fill(meant, run.ideal.values, time)
         fill_errors(arrays, meant, run.system, slice(0, len(time)))
     return True
 

@@ -88,17 +88,21 @@ class Run:
         conditions = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
         return self.solve(time, {**self.values, **offsets}, method, conditions, self._past)
 
-    def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
-        """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
-        return self.solve(time, self.ideal_values, method, None, self._ideal_past)
+    @functools.cached_property
+    def ideal(self) -> Run:
+        """The mechanism without errors and with every pin in the middle of its hole; this very one if that is so."""
+        ideal = self.system.mechanism.ideal_parameters()
+        same = all(value is self.values[path] or value == self.values[path] for path, value in ideal.items())
+        return self if same else replace(self, values=ideal)
+
+    @functools.cached_property
+    def erring(self) -> bool:
+        """Whether it is another mechanism than the ideal one."""
+        return bool(self.seats) or self.ideal is not self
 
     @functools.cached_property
     def _past(self) -> dict[str, History]:
         return self._histories(self.values)
-
-    @functools.cached_property
-    def _ideal_past(self) -> dict[str, History]:
-        return self._past if self.ideal_values is self.values else self._histories(self.ideal_values)
 
     @np.errstate(all="ignore")
     def _histories(self, values: Values) -> dict[str, History]:
@@ -123,16 +127,8 @@ class Run:
     @functools.cached_property
     def bends(self) -> list[Bend]:
         """Where in the cycle its forces may jump or bend as the model says it, in no order; see `switches`."""
-        return self._bends(self.values)
-
-    @functools.cached_property
-    def ideal_bends(self) -> list[Bend]:
-        """The same of the mechanism without errors."""
-        return self.bends if self.ideal_values is self.values else self._bends(self.ideal_values)
-
-    def _bends(self, values: Values) -> list[Bend]:
         passed = {time for met in self.chosen.meetings.values() for place in met.at for time in place}
-        bends = stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
+        bends = stated_bends(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))
         return [*bends, *(Bend(time) for time in sorted(passed))]
 
     @np.errstate(all="ignore")
@@ -162,18 +158,6 @@ class Run:
         breaks = breaks_between(self.cycle, times) if moves else np.array([0.0, 1.0])
         in_parts = in_blocks(look if moves else lambda time: look(0.0 * time), joints or len(self.system.joints))
         return Courses.of(in_parts, breaks, like, accuracy_of(self.cycle, accuracy or Accuracy()))
-
-    @functools.cached_property
-    def ideal_values(self) -> Values:
-        """The numbers of the mechanism without errors; its own, the very same, if it has none."""
-        ideal = self.system.mechanism.ideal_parameters()
-        same = all(value is self.values[path] or value == self.values[path] for path, value in ideal.items())
-        return self.values if same else ideal
-
-    @functools.cached_property
-    def erring(self) -> bool:
-        """Whether it is another mechanism than the ideal one."""
-        return bool(self.seats) or self.ideal_values is not self.values
 
     @functools.cached_property
     def determinacy(self) -> Determinacy | None:

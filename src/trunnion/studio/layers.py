@@ -118,7 +118,9 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
 
     inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
     run = replace(bare, values={**bare.values, **numbers})
-    run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
+    run.__dict__.update(
+        ideal=replace(run, values=inputs.nominal), erring=True, seats=[]
+    )  # its pins lie where the corner has them
     result = result_of(run, positions(run, steps, margin=False, averaged=False)).dataset
     drawn_scene = scene(result, max_positions=steps)
     for joint in inputs.loose:

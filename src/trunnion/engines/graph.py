@@ -168,30 +168,15 @@ class Graph:
             for value, other in ((first, b), (second, a)):
                 if value is not None:
                     return other if value is identity else self.constant(not identity)
-        if op == "add":
-            return self._sum(args, constants)
-        if op == "sub":
-            return self._difference(args, constants)
-        if op in ("mul", "div"):
-            return self._product(op, args, constants)
-        return None
-
-    def _sum(self, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
-        (a, b), (first, second) = args, constants
-        if first == 0.0 or second == 0.0:
-            return b if first == 0.0 else a
-        for term, other in ((a, b), (b, a)):
-            if self.nodes[other].op == "neg":
-                return self.apply("sub", term, self.nodes[other].args[0])
-        return None
-
-    def _difference(self, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
-        (a, b), (first, second) = args, constants
-        if second == 0.0:
-            return a
-        if first == 0.0:
-            return self.apply("neg", b)
-        return self.apply("add", a, self.nodes[b].args[0]) if self.nodes[b].op == "neg" else None
+        if op in ("add", "sub"):
+            if second == 0.0:
+                return a
+            if first == 0.0:
+                return b if op == "add" else self.apply("neg", b)
+            if self.nodes[b].op == "neg":
+                return self.apply("sub" if op == "add" else "add", a, self.nodes[b].args[0])
+            return self.apply("sub", b, self.nodes[a].args[0]) if op == "add" and self.nodes[a].op == "neg" else None
+        return self._product(op, args, constants) if op in ("mul", "div") else None
 
     def _product(self, op: str, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
         (a, b), (first, second) = args, constants
@@ -251,17 +236,15 @@ class Graph:
                 break
             differs = most
         made = self.loops[index] = Loop(rounds, states, results, ends)
-        outer = [n for n in self._outside(made.outputs, index) if self.values[n] is None]
+        # the nodes from outside of the loop that it is made of directly
+        reached = sorted(self._reached(made.outputs, index))
+        outer = [n for n in reached if not self.within[n] >> index & 1 and self.values[n] is None]
         loop = self.node("loop", (*start, *outer), index)
         return [self.node("result", (loop,), k) for k in range(len(start))]
 
     def inside(self, numbers: Iterable[int], index: int) -> list[int]:
         """The nodes of a loop that these are made of, in order."""
         return sorted(n for n in self._reached(numbers, index) if self.within[n] >> index & 1)
-
-    def _outside(self, numbers: Iterable[int], index: int) -> list[int]:
-        """The nodes from outside of a loop that these are made of directly."""
-        return sorted(n for n in self._reached(numbers, index) if not self.within[n] >> index & 1)
 
     def _reached(self, numbers: Iterable[int], index: int) -> set[int]:
         """Nodes that these are made of, down to the first outside of the loop."""

@@ -92,47 +92,9 @@ class _Writer:
     tabled: Sequence[int] = ()
 
     def write(self) -> Program:
-        live = self.graph.live(self.outputs)
-        names = tuple(self._inputs(live, differs) for differs in KINDS)
-        self._open()
-        self._point(names)
-        self._body(live)
-        self.b.ret_void()
-        return Program(str(self.module), names, len(self.tabled), self.width)
-
-    def _point(self, names: Sequence[Sequence[str]]) -> None:
-        """Where the inputs and outputs lie."""
-        self.pointers = [
-            {name: self._pointer(argument, k) for k, name in enumerate(array_names)}
-            for argument, array_names in zip(self.arguments[5:9], names, strict=True)
-        ]
-        self.out = [self._pointer(self.arguments[9], k) for k in range(len(self.outputs))]
-
-    def _body(self, live: Sequence[int]) -> None:
-        """Loops over samples and positions."""
-        level = {n: self.graph.differs[n] for n in live}
-        if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
-            level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
-        stated_nodes, once, ahead, each = ([n for n in live if level[n] == kind] for kind in KINDS)
-        plain: dict[int, Value] = self._loaded(0, ir.Constant(LONG, 0))
-        self._emit(stated_nodes, plain, self.scalar)
-        wide = self._spread(plain, [*ahead, *each])
-        self.tabled = self._frontier(ahead, each)
-        if self.tabled:
-            self._fill_table(ahead, wide)
-        self._samples(once, each, plain, wide)
-
-    def _spread(self, plain: dict[int, Value], readers: Iterable[int]) -> dict[int, Value]:
-        """Plain numbers in all lanes, those that some nodes read or that are outputs."""
-        read = {arg for n in readers for arg in self.graph.nodes[n].args} | set(self.outputs)
-        return {n: self.lanes.splat(plain[n]) for n in sorted(read & plain.keys())}
-
-    def _inputs(self, live: Iterable[int], differs: int) -> tuple[str, ...]:
-        nodes = (self.graph.nodes[n] for n in live)
-        return tuple(node.extra for node in nodes if node.op == "input" and self.graph.inputs[node.extra] == differs)
-
-    def _open(self) -> None:
-        """The function with its arguments, and a builder at its entry."""
+        graph, live = self.graph, self.graph.live(self.outputs)
+        inputs = [graph.nodes[n].extra for n in live if graph.nodes[n].op == "input"]
+        names = tuple(tuple(name for name in inputs if graph.inputs[name] == kind) for kind in KINDS)
         double = DOUBLE.as_pointer()
         kinds = [*[LONG] * 5, *[double.as_pointer()] * 5, double]
         function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), name="kernel")
@@ -140,15 +102,34 @@ class _Writer:
         self.b = ir.IRBuilder(function.append_basic_block("entry"))
         tables: dict[tuple[float, ...], Value] = {}
         self.lanes, self.scalar = Lanes(self.b, self.width, tables), Lanes(self.b, 1, tables)
+        self.pointers = [
+            {name: self._pointer(argument, k) for k, name in enumerate(array_names)}
+            for argument, array_names in zip(self.arguments[5:9], names, strict=True)
+        ]
+        self.out = [self._pointer(self.arguments[9], k) for k in range(len(self.outputs))]
+        level = {n: graph.differs[n] for n in live}
+        if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
+            level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
+        stated_nodes, once, ahead, each = ([n for n in live if level[n] == kind] for kind in KINDS)
+        plain: dict[int, Value] = self._loaded(0, ir.Constant(LONG, 0))
+        self._emit(stated_nodes, plain, self.scalar)
+        wide = self._spread(plain, [*ahead, *each])
+        # what differs by position alone and is read where samples are gone through
+        read = {arg for n in each for arg in graph.nodes[n].args} | set(self.outputs)
+        self.tabled = sorted(read & {n for n in ahead if graph.nodes[n].op not in ("input", "loop")})
+        if self.tabled:
+            self._fill_table(ahead, wide)
+        self._samples(once, each, plain, wide)
+        self.b.ret_void()
+        return Program(str(self.module), names, len(self.tabled), self.width)
+
+    def _spread(self, plain: dict[int, Value], readers: Iterable[int]) -> dict[int, Value]:
+        """Plain numbers in all lanes, those that some nodes read or that are outputs."""
+        read = {arg for n in readers for arg in self.graph.nodes[n].args} | set(self.outputs)
+        return {n: self.lanes.splat(plain[n]) for n in sorted(read & plain.keys())}
 
     def _pointer(self, array: Value, k: int) -> Value:
         return self.b.load(self.b.gep(array, [ir.Constant(LONG, k)]))
-
-    def _frontier(self, ahead: Sequence[int], each: Sequence[int]) -> list[int]:
-        """Nodes that differ by position alone and are read where samples are gone through."""
-        frontier = {n for n in ahead if self.graph.nodes[n].op not in ("input", "loop")}
-        read = {arg for n in each for arg in self.graph.nodes[n].args} | set(self.outputs)
-        return sorted(frontier & read)
 
     # ---- loops ----------------------------------------------------------------------------------------------------
 
@@ -162,29 +143,26 @@ class _Writer:
 
         _counted(self.b, low, high, self.width, moved)
 
-    def _fill_table(self, ahead: Sequence[int], wide: dict[int, Value]) -> None:
+    def _tabled_place(self, k: int, p: Value) -> Value:
+        """Where the k-th number of the table is at a position."""
         low, high = self.arguments[2:4]
-        row = self.b.sub(high, low)
+        return self.b.add(self.b.mul(self.b.sub(high, low), ir.Constant(LONG, k)), self.b.sub(p, low))
 
+    def _fill_table(self, ahead: Sequence[int], wide: dict[int, Value]) -> None:
         def body(p: Value) -> None:
             values = {**wide, **self._loaded(POSITION, p)}
             self._emit(ahead, values, self.lanes)
             for k, n in enumerate(self.tabled):
-                self._store(self.arguments[10], self._place(row, k, self.b.sub(p, low)), self._as_double(values[n]))
+                bit = values[n].type == self.lanes.bit
+                number = self.b.uitofp(values[n], self.lanes.double) if bit else values[n]
+                self._store(self.arguments[10], self._tabled_place(k, p), number)
 
         self._positions(body)
-
-    def _place(self, row: Value, k: int, p: Value) -> Value:
-        return self.b.add(self.b.mul(row, ir.Constant(LONG, k)), p)
-
-    def _as_double(self, value: Value) -> Value:
-        return self.b.uitofp(value, self.lanes.double) if value.type == self.lanes.bit else value
 
     def _samples(
         self, once: Sequence[int], each: Sequence[int], constants: dict[int, Value], all_samples: dict[int, Value]
     ) -> None:
-        first, last, low, high, stride = self.arguments[:5]
-        row = self.b.sub(high, low)
+        first, last, _, _, stride = self.arguments[:5]
 
         def sample(s: Value) -> None:
             plain = {**constants, **self._loaded(SAMPLE, s)}
@@ -197,7 +175,7 @@ class _Writer:
                 place = self.b.add(start, p)
                 values = {**wide, **self._loaded(POSITION, p), **self._loaded(BOTH, place)}
                 for k, n in enumerate(self.tabled):
-                    entry = self._load(self.arguments[10], self._place(row, k, self.b.sub(p, low)))
+                    entry = self._load(self.arguments[10], self._tabled_place(k, p))
                     bit = self.graph.booleans[n]
                     values[n] = self.lanes.compare("!=", entry, self.lanes.constant(0.0)) if bit else entry
                 self._emit(each, values, self.lanes)

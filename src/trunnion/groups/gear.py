@@ -19,22 +19,12 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame, Vector2, Wrench, about, times
 
 __all__ = [
-    "NUMBERS",
-    "GearPair",
-    "Mesh",
-    "ToothForce",
-    "actions",
-    "apart",
-    "mesh",
-    "rotation",
-    "slide_of",
-    "thread_forces",
+    "NUMBERS", "GearPair", "Mesh", "ToothForce", "actions", "apart", "mesh", "rotation", "slide_of", "thread_forces",
     "turn_from",
-]
+]  # fmt: skip
 
-NUMBERS = (
-    3  # that a module is given for each gear pair, after its drive: ratio, phase, coordinate φ₁ to the nearest turn
-)
+# that a module is given for each gear pair, after its drive: ratio, phase, coordinate φ₁ to the nearest turn
+NUMBERS = 3
 
 
 class GearPair(NamedTuple):

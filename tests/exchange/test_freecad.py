@@ -202,7 +202,7 @@ def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory: Any, whol
     draft = import_file(drawing.save(tmp_path_factory.mktemp("fc") / "one.FCStd"))
     assert draft.ground == "Base"
     assert set(draft.bodies) == {"Base", "Crank", "Rod", "Rocker"}
-    assert codes(draft) == ["masses", "drive"]
+    assert codes(draft) == ["lost", "drive"]
     for name, bars in BARS.items():
         pair = draft.pairs[name]
         assert pair.links == bars
@@ -255,7 +255,7 @@ def test_kinds_of_joints_and_their_limits(tmp_path: Path) -> None:
         assert pair_of(kind, round_, tmp_path).pairs["J"].type == wanted
     fixed = pair_of("Fixed", np.eye(4), tmp_path)
     assert set(fixed.bodies) == {"Base", "Arm"}
-    assert codes(slider) == ["masses", "drive"]
+    assert codes(slider) == ["lost", "drive"]
 
 
 @pytest.mark.parametrize("kind", KINDS[5:])

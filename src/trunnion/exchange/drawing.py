@@ -103,8 +103,6 @@ def write(positions: Positions, path: Path) -> list[Finding]:
     if draft.plane:
         right = max(float(part[:, 0].max()) for part in (corners, *curves))
         _polygons(space, positions, draft, np.array([right + 0.5 * size, corners[:, 1].min()]), size)
-    else:
-        draft.note("exchange.spatial", "file", "lines are drawn in space; only planar mechanisms have force polygons")
     document.saveas(path)
     return draft.findings
 

@@ -123,9 +123,9 @@ def read(path: Path, options: ImportOptions) -> Draft:
         draft.lose(f"{number} {kind}")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
-        draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z")
+        draft.lose("heights along z")
     _Reader(sketch, draft, options, size).read()
-    draft.note("exchange.mass", "file", "a DXF holds no masses", "add mass, centre and inertia to the links")
+    draft.lose("masses, which a DXF does not hold")
     return draft
 
 
@@ -347,8 +347,7 @@ class _Reader:
             for line in both:
                 guided.setdefault(layers, {}).setdefault(line.layer, {})[line] = None
         for layers in sorted(chance - guided.keys(), key=sorted):
-            what = f"lines of {' and '.join(sorted(layers))} lie on each other, one between joints: no guide is read"
-            draft.note("exchange.line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
+            draft.lose("guides along lines between joints", " and ".join(sorted(layers)))
         for lines in guided.values():
             free = {layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
                     for layer, drawn in lines.items()}  # fmt: skip
@@ -416,14 +415,12 @@ class _Reader:
                 draft.warn("exchange.slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot")
             return
         if slots:
-            draft.warn("exchange.slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
+            draft.lose("pins in several slots", layer)
         points = draft.bodies[layer].points
         points[f"P{len(points) + 1}"] = np.array([*at, 0.0])
         near = [k for k in self.drawn if k != number and np.hypot(*(self.places[k] - at)) <= self.gap]
-        others = sorted({other for k in near for other in self.marks[k]} - {layer})
-        if others and max(radii) > 0:
-            what = f"has a circle almost about the centre of one of {', '.join(others)}, which is no joint"
-            draft.warn("exchange.near", f"links.{layer}", what, "draw both about one centre if they are a joint")
+        if max(radii) > 0 and any(self.marks[k].keys() - {layer} for k in near):
+            draft.lose("circles almost about the centre of another, which are no joint", layer)
 
     def _names(self) -> None:
         """Texts name the joint or point nearest to them, those on a layer of its links first.

@@ -121,8 +121,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
         raise refused("has a joint or placement that cannot be read") from None
     if not draft.pairs:
         raise refused("has no joint between two parts that is read")
-    what = f"masses of {len(draft.bodies)} parts are not read: they follow from shapes that only FreeCAD knows"
-    draft.note("exchange.masses", "links", what, "write those of each link, or import the parts as STEP too")
+    draft.lose("masses, which follow from shapes that only FreeCAD knows")
     return draft
 
 

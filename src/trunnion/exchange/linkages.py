@@ -275,9 +275,9 @@ def _of_pylinkage(data: Any, options: ImportOptions) -> Draft:
         raise refused("has no joints of pylinkage with places", "", WRITTEN)
     few(len(joints), MOST, "joints")
     draft = Draft(str(data.get("name") or ""), {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
-    draft.note("exchange.unit", "", f"lengths are taken in units of {options.unit:g} m", "state another with --unit")
+    unit = draft.assumed_unit(options)
     try:
-        pins = {joint["id"]: _pin(joint, options.unit) for joint in joints}
+        pins = {joint["id"]: _pin(joint, unit) for joint in joints}
         if len(pins) < len(joints):
             raise refused("has two joints of the same name", "", WRITTEN)
         _connect(data, pins, draft)

@@ -7,6 +7,7 @@ cycle; its solids are rods between the joints and cylinders as pins, which show 
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import math
 import struct
@@ -22,7 +23,18 @@ from defusedxml import DefusedXmlException, ElementTree
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, perpendicular, refused
+from trunnion.exchange.draft import (
+    Array,
+    Body,
+    Draft,
+    ImportOptions,
+    Pair,
+    Place,
+    few,
+    free_name,
+    perpendicular,
+    refused,
+)
 from trunnion.exchange.skeleton import Positions
 from trunnion.version import __version__
 
@@ -80,7 +92,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     for name, vertices, faces in meshes:
         body = _weighed(draft, free_name(name, draft.bodies), vertices, faces, options.density)
         draft.bodies[body.name] = body
-    draft.note("exchange.joints", "file", "a mesh holds no joints", "copy the links into a model, or import STEP")
+    draft.lose("joints, which a mesh does not hold")
     return draft
 
 
@@ -91,7 +103,8 @@ def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: fl
         draft.warn("exchange.mesh", f"links.{name}", "has no triangles, or corners that are no numbers")
         return body
     size = ", ".join(f"{1e3 * extent:.6g}" for extent in mesh.extents)
-    body.comments.append(f"a mesh of {len(mesh.faces):,} triangles, {size} mm large")
+    shells = f" in {mesh.body_count} shells" if mesh.body_count > 1 else ""
+    body.comments.append(f"a mesh of {len(mesh.faces):,} triangles{shells}, {size} mm large")
     mesh.density = density
     with np.errstate(all="ignore"):  # of a sheet, which has no volume
         properties = mesh.mass_properties
@@ -100,9 +113,6 @@ def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: fl
         what = "is not closed, encloses no volume, or its triangles do not all face outwards; it has no mass here"
         draft.warn("exchange.open_mesh", f"links.{name}", what, "mend the mesh, or state mass, centre and inertia")
         return body
-    if mesh.body_count > 1:
-        what = f"holds {mesh.body_count} separate shells; they are weighed as one body"
-        draft.note("exchange.shells", f"links.{name}", what, "export parts that move against each other apart")
     body.mass, body.centre = float(sign * properties.mass), np.array(properties.center_mass)
     body.inertia = sign * np.array(properties.inertia)
     body.comments.append(f"mass by a density of {density:g} kg/m³; a mesh cuts the corners of curved faces")
@@ -124,12 +134,11 @@ def _of_3mf(path: Path) -> Iterator[Mesh]:
             root = ElementTree.fromstring(stream.read(MOST_XML), forbid_dtd=True)
     unit = UNITS[root.get("unit", "millimeter")]
     objects = {part.get("id", ""): part for part in root.iterfind("{*}resources/{*}object")}
-    count = [0]
+    count = itertools.count()
 
-    def placed(number: str, transform: Array, depth: int) -> Iterator[Mesh]:
+    def placed(number: str, place: Place, depth: int) -> Iterator[Mesh]:
         part = objects[number]
-        count[0] += 1
-        few(count[0], MOST_BODIES, "parts")
+        few(next(count), MOST_BODIES, "parts")
         few(depth, DEEPEST, "parts in one another")
         name = part.get("name") or f"part {number}"
         for mesh in part.iterfind("{*}mesh"):
@@ -139,23 +148,19 @@ def _of_3mf(path: Path) -> Iterator[Mesh]:
             vertices, triangles = np.array(corners).reshape(-1, 3), np.array(faces, int).reshape(-1, 3)
             if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(vertices):
                 raise ValueError("a triangle without a corner")
-            yield name, unit * (vertices @ transform[:3] + transform[3]), triangles
+            yield name, unit * (vertices @ place.matrix.T + place.shift), triangles
         for component in part.iterfind("{*}components/{*}component"):
-            yield from placed(component.get("objectid", ""), _chained(_matrix(component), transform), depth + 1)
+            yield from placed(component.get("objectid", ""), place @ _place(component), depth + 1)
 
     for item in root.iterfind("{*}build/{*}item"):
-        yield from placed(item.get("objectid", ""), _matrix(item), 0)
+        yield from placed(item.get("objectid", ""), _place(item), 0)
 
 
-def _matrix(part: Any) -> Array:
-    """The transform of a part of a 3MF, (4, 3): points are rows to its left, the last row is the shift."""
+def _place(part: Any) -> Place:
+    """The place of a part of a 3MF; its transform is written for rows of points, which stand to its left."""
     text = part.get("transform")
-    return np.array(text.split(), float).reshape(4, 3) if text else np.eye(4)[:, :3]
-
-
-def _chained(inner: Array, outer: Array) -> Array:
-    """The transform that is first the inner one, then the outer."""
-    return np.vstack([inner[:3] @ outer[:3], inner[3] @ outer[:3] + outer[3]])
+    rows = np.array(text.split(), float).reshape(4, 3) if text else np.eye(4)[:, :3]
+    return Place(rows[:3].T, rows[3])
 
 
 # ---- GLB out ------------------------------------------------------------------------------------------------------

@@ -337,7 +337,7 @@ def read_urdf(path: Path, options: ImportOptions) -> Draft:
     reader.add_model(model, "", WORLD)
     for part in root.iterfind("transmission/joint"):
         draft.drives.setdefault(part.get("name", ""), 0.0)
-    draft.note("exchange.gravity", "", "is read without gravity, which URDF does not state", "add gravity to the model")
+    draft.lose("gravity, which URDF does not state")
     reader.add_joints()
     _frames(draft, closes=root.find("gazebo/joint") is None)
     return reader.settled(world, options.ground)

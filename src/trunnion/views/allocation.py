@@ -55,23 +55,21 @@ def headed(result: xr.Dataset) -> str:
 
 
 def bought(result: xr.Dataset) -> Table:
-    """Each tolerance that has a cost: what it is to be, what it costs, and what it was."""
+    """Each tolerance that has a cost: what it is to be, in mm or degrees, what it costs, and what it was."""
     units, paths = units_along(result["tolerance"], "parameter"), names(result, "parameter")
     groups = {str(row["path"]): str(row["group"]) for row in attribute(result, "prices")}
-
-    def half(value: float, j: int) -> str:
-        """In mm or degrees, to five digits."""
-        factor, unit = drawn_in(value, units[j])
-        sign = "" if is_play(paths[j]) else "±"
-        return joined(f"{sign}{value * factor:.5g}", unit) if math.isfinite(value) else NONE
-
-    keys, rows = ("tolerance", "cost", "cost_share", "tolerance_before", "cost_before"), []
+    rows = []
     for j in np.flatnonzero(result["bought"].values).tolist():
-        width, cost, part, width_before, cost_before = (float(result[key].values[j]) for key in keys)
-        rows.append([paths[j], half(width, j), str(result["choice"].values[j]), groups.get(paths[j], ""), _cost(cost),
-                     share(part, 1), half(width_before, j), _cost(cost_before)])  # fmt: skip
-    total, before = (_cost(float(result[key])) for key in ("cost_total", "cost_total_before"))
-    rows.append(["all", "", "", "", total, share(1.0), "", before])
+        widths = []
+        for width in (float(result[key].values[j]) for key in ("tolerance", "tolerance_before")):
+            factor, unit = drawn_in(width, units[j])
+            text = f"{'' if is_play(paths[j]) else '±'}{width * factor:.5g}"
+            widths.append(joined(text, unit) if math.isfinite(width) else NONE)
+        cost, part, before = (float(result[key].values[j]) for key in ("cost", "cost_share", "cost_before"))
+        rows.append([paths[j], widths[0], str(result["choice"].values[j]), groups.get(paths[j], ""), _cost(cost),
+                     share(part, 1), widths[1], _cost(before)])  # fmt: skip
+    total, before = (float(result[key]) for key in ("cost_total", "cost_total_before"))
+    rows.append(["all", "", "", "", _cost(total), share(1.0), "", _cost(before)])
     head = ["parameter", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
     return Table("allocated tolerances", head, rows).without_empty()
 
@@ -81,7 +79,7 @@ def room(result: xr.Dataset) -> Table:
     rows = []
     split = "yield_margin" in result and int(np.sum(np.isfinite(result["yield_margin"].values))) > 1
     for read in readings(result):
-        margin = f"{read.value('yield_margin'):.4g} σ" if split and read.limited else NONE
+        margin = f"{read.value('yield_margin'):.4g} σ" if split and read.limits_said else NONE
         lower, upper = (read.limits[0], read.room[1]) if read.is_size else read.room
         sides = ((read.value("searched_lower"), lower), (read.value("searched_upper"), upper))
         shares = [max(part / end, 0.0) for part, end in sides if math.isfinite(part + end) and end != 0]

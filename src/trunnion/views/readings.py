@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
-LEAST = 1e-3  # a share below which a number has no row of its own
 
 
 # ---- numbers in words -----------------------------------------------------------------------------------------------
@@ -49,16 +48,6 @@ def limits_text(lower: float, upper: float) -> str:
     return "/".join(ends)
 
 
-def limits_in(lower: float, upper: float, unit: str, path: str) -> str:
-    """Limits of a toleranced number with their unit; of a play how far its pin may be from the middle."""
-    if math.isnan(lower) or math.isnan(upper):
-        return ""
-    factor, display_unit = drawn_in(max(abs(lower), abs(upper)), unit)
-    within = f"within\u00a0{rounded(upper * factor)}"
-    text = within if is_play(path) else limits_text(lower * factor, upper * factor)
-    return joined(text, display_unit.replace(" ", "\u00a0"))
-
-
 def is_play(path: str) -> bool:
     """Whether a parameter is the play of a joint: how far its pin may be from the middle, to any side."""
     return path.startswith("joints.") and path.endswith(".clearance") and path.count(".") == 2
@@ -81,19 +70,18 @@ def share(value: float, decimals: int | None = None) -> str:
     return f"{fixed(100 * value, 0 if value in (0.0, 1.0) else decimals)}\u00a0%"
 
 
+def share_parts(value: float, low: float, high: float) -> tuple[str, str]:
+    """A share and its interval with the digits that this bears: "99.62 %" and "99.41 to 99.76 %", "" without one."""
+    if math.isnan(low) or math.isnan(high):
+        return share(value), ""
+    text, least, most = (share(part, decimals_of(high - low)) for part in (value, low, high))
+    return text, f"{least[:-2]} to {most}"
+
+
 def share_interval(value: float, low: float, high: float) -> str:
     """A share with its interval: "99.62 % (99.41 to 99.76 %)"."""
-    text, ends, _ = share_parts(value, low, high)
+    text, ends = share_parts(value, low, high)
     return f"{text} ({ends})" if ends else text
-
-
-def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | None]:
-    """A share, its interval ("" if there is none), and the decimals of a per cent that the interval bears."""
-    if math.isnan(low) or math.isnan(high):
-        return share(value), "", None
-    decimals = decimals_of(high - low)
-    least = share(low, decimals).removesuffix("\u00a0%")
-    return share(value, decimals), f"{least} to {share(high, decimals)}", decimals
 
 
 # ---- measures -------------------------------------------------------------------------------------------------------
@@ -129,6 +117,10 @@ class MeasureReading:
         """One number, NaN if the result lacks it."""
         return float(self.result[key].values) if key in self.result else math.nan
 
+    def interval(self, key: str) -> tuple[float, float, float]:
+        """One number with the ends of its 95 % interval."""
+        return self.value(key), self.value(f"{key}_low"), self.value(f"{key}_high")
+
     def row(self, key: str) -> Array:
         """A row of numbers, empty if the result lacks it."""
         return np.asarray(self.result[key].values, float) if key in self.result else np.empty(0)
@@ -142,11 +134,6 @@ class MeasureReading:
         """Lower and upper end of the deviation that limits and bounds leave, SI; a size has no lower one."""
         low, high = (bound - self.nominal for bound in self.bounds)
         return -math.inf if self.is_size else max(self.limits[0], low), min(self.limits[1], high)
-
-    @property
-    def limited(self) -> bool:
-        """Whether the figure has a limit."""
-        return any(map(math.isfinite, (*self.limits, *self.bounds)))
 
     @property
     def rss_label(self) -> str:
@@ -163,10 +150,10 @@ class MeasureReading:
         """The unit behind a title: " [°]"; empty for a pure number."""
         return f" [{self.label}]" if self.label else ""
 
-    def say(self, value: float, sign: bool = False) -> str:
-        """A value of the measure with its unit; sign: a plus before what is above 0."""
+    def say(self, value: float) -> str:
+        """A value of the measure with its unit."""
         text = fixed(value * self.factor, self.decimals)
-        return joined(f"{'+' if sign and value > 0 else ''}{text}", self.label) if math.isfinite(value) else text
+        return joined(text, self.label) if math.isfinite(value) else text
 
     def written(self, key: str) -> str:
         """A number of the result with its unit; empty if it is not known."""
@@ -178,14 +165,14 @@ class MeasureReading:
 
     def deviations(self, low: float, high: float) -> str:
         """Deviations from nominal as limits are written: "±0.2375°", "−0.1732 to +0.1599°"; the end of a size."""
+        least, most = (fixed(end * self.factor, self.decimals) for end in (low, high))
         if math.isnan(low) and math.isnan(high):
             return ""
         if low == 0.0 and self.nominal == 0.0:
-            return self.say(high)
-        upper = self.say(high, sign=True)
-        if upper.startswith("+") and self.say(-low, sign=True) == upper:
-            return f"±{upper[1:]}"
-        return f"{'+' if low > 0 else ''}{fixed(low * self.factor, self.decimals)} to {upper}"
+            return joined(most, self.label)
+        if least == f"−{most}":
+            return joined(f"±{most}", self.label)
+        return joined(f"{'+' if low > 0 else ''}{least} to {'+' if high > 0 else ''}{most}", self.label)
 
     @property
     def limits_said(self) -> str:
@@ -207,11 +194,6 @@ class MeasureReading:
         return f" at {place:.4g}°" if unit in ("°", "deg") else f" at {place:.4g}\u00a0{unit}".rstrip()
 
     @property
-    def interval(self) -> tuple[float, float, float]:
-        """Yield with the ends of its 95 % interval; NaN if it is not known."""
-        return self.value("yield"), self.value("yield_low"), self.value("yield_high")
-
-    @property
     def outer(self) -> tuple[float, float] | None:
         """Ends of the range of 99.73 % of the samples."""
         if not self.has("quantile_value"):
@@ -224,51 +206,34 @@ class MeasureReading:
     def contributions(self) -> pd.DataFrame:
         """Of every toleranced number what it has in the measure, SI, by its path, the largest share first.
 
-        short: without the section, where that names one number only; limits: as in a drawing; sensitivity: of the
-        measure by the number; worst: of the worst case; shares, NaN where they are not known: of the worst case, of
-        RSS², and of the variance, below 0 where a correlated number takes away from what the others do.
+        short: without the section, where that names one number only; limits: as in a drawing, of a play how far its
+        pin may be from the middle; slope: change of the measure by it, in the units in which both are written; worst:
+        of the worst case; shares, NaN where they are not known: of the worst case, of RSS², and of the variance, below
+        0 where a correlated number takes away from what the others do.
         """
-        paths = names(self.result, "parameter")
-        unknown = np.full(len(paths), np.nan)
-
-        def row(key: str) -> Array:
-            return self.row(key) if key in self.result else unknown
-
-        ends = [path.partition(".")[2] or path for path in paths]
-        rows = pd.DataFrame(
-            {
-                "short": [end if ends.count(end) == 1 else path for path, end in zip(paths, ends, strict=True)],
-                "unit": units_along(self.result["parameter_nominal"], "parameter"),
-                "lower": row("parameter_lower"), "upper": row("parameter_upper"), "sensitivity": row("sensitivity"),
-                "worst": row("contribution_worst_case"), "rss_share": row("contribution_rss"),
-                "variance_share": row("contribution_variance"),
-            },
-            index=paths,
-        )  # fmt: skip
-        rows["limits"] = [limits_in(row.lower, row.upper, row.unit, path) for path, row in rows.iterrows()]
-        total = rows["worst"].sum()
-        rows["worst_share"] = rows["worst"] / (total if total > 0 else np.nan)
-        return rows.sort_values(["rss_share", "worst_share"], ascending=False, kind="stable")
-
-    def largest(self, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """At most so many contributions that have a row or bar of their own, and the rest."""
-        rows = self.contributions
-        sizes = rows[["worst_share", "rss_share", "variance_share"]].abs().max(axis=1).fillna(0.0)
-        large = rows[sizes >= LEAST][:most]
-        large = rows[:1] if large.empty else large
-        if len(rows) == len(large) + 1:  # the last takes no more room than its being left out
-            large = rows
-        return large, rows.drop(large.index)
-
-    def slope(self, row: Any) -> str:
-        """Change of the measure by a number, in the units in which both are written: "0.01365 °/mm"."""
-        if math.isnan(row.sensitivity):
-            return NONE
-        half = row.worst / abs(row.sensitivity) if row.sensitivity else math.nan  # whose unit is that of the limits
-        factor, display_unit = drawn_in(half if half > 0 else 1.0, row.unit)
-        display_unit = display_unit.replace(" ", "\u00a0")
-        unit = f"{self.label or '1'}/{display_unit}" if display_unit else self.label
-        return f"{number(row.sensitivity * self.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
+        paths, units = names(self.result, "parameter"), units_along(self.result["parameter_nominal"], "parameter")
+        keys = ("parameter_lower", "parameter_upper", "sensitivity", "contribution_worst_case", "contribution_rss",
+                "contribution_variance")  # fmt: skip
+        columns = [self.row(key) if key in self.result else np.full(len(paths), np.nan) for key in keys]
+        total, ends, rows = np.nansum(columns[3]), [path.partition(".")[2] or path for path in paths], []
+        for path, end, unit, *numbers in zip(paths, ends, units, *columns, strict=True):
+            lower, upper, sensitivity, worst, rss, variance = map(float, numbers)
+            limits, slope = "", NONE
+            if not math.isnan(lower + upper):
+                factor, display_unit = drawn_in(max(abs(lower), abs(upper)), unit)
+                within = f"within\u00a0{rounded(upper * factor)}"
+                limits = joined(within if is_play(path) else limits_text(lower * factor, upper * factor),
+                                display_unit.replace(" ", "\u00a0"))  # fmt: skip
+            if not math.isnan(sensitivity):
+                half = worst / abs(sensitivity) if sensitivity else 0.0  # whose unit is that of the limits
+                factor, display_unit = drawn_in(half if half > 0 else 1.0, unit)
+                ratio = f"{self.label or '1'}/{display_unit}" if display_unit else self.label
+                slope = f"{number(sensitivity * self.factor / factor)}\u00a0{ratio}".replace(" ", "\u00a0").rstrip()
+            short = end if ends.count(end) == 1 else path
+            rows.append((short, unit, limits, slope, worst, worst / (total or np.nan), rss, variance))
+        heads = ["short", "unit", "limits", "slope", "worst", "worst_share", "rss_share", "variance_share"]
+        table = pd.DataFrame(rows, index=paths, columns=heads)
+        return table.sort_values(["rss_share", "worst_share"], ascending=False, kind="stable")
 
 
 def readings(result: xr.Dataset) -> list[MeasureReading]:
@@ -306,12 +271,3 @@ def readings(result: xr.Dataset) -> list[MeasureReading]:
             nominal, nominal == 0.0 and not least < 0.0, over if over is not None and over.span > 0 else None,
         ))  # fmt: skip
     return reads
-
-
-def failures(result: xr.Dataset) -> list[tuple[str, int]]:
-    """Why samples have no figures, and how many; all together first."""
-    if "failed" not in result:
-        return []
-    tally = dict(zip(names(result, "cause"), np.asarray(result["failed"].values).astype(int).tolist(), strict=True))
-    rest = [(cause.replace("_", " ").split(":")[0], n) for cause, n in tally.items() if cause != "all" and n]
-    return [("all", tally.get("all", sum(n for _, n in rest))), *rest]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,79 +31,70 @@ from trunnion.views.charts import (
     silent,
 )  # fmt: skip
 from trunnion.views.page import Section, Table, counts, page
-from trunnion.views.readings import (
-    OUTER,
-    MeasureReading,
-    failures,
-    readings,
-    share,
-    share_interval,
-    share_parts,
-    value_text,
-)
+from trunnion.views.readings import OUTER, MeasureReading, readings, share, share_interval, share_parts, value_text
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 EXTREMES = ("maximum", "minimum", "largest")  # rules of figures that are taken where the course is extreme
 APART = 5e-4  # two shares that differ by more are written each
-LEAST_INDEX = 5e-3  # share of the variance below which a number has no index of its own
+LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row or bar, and no index of its own
 MOST_ROWS, MOST_BARS, FEW_BARS = 20, 16, 4  # contributions with a row, a bar, a bar beside other measures
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
 
-Cells = dict[str, str]  # text by column; a column without any text is left out
 COLUMNS = {"linear": "linear", "searched": "searched", "sampled": "samples", "interval": "95 % interval"}
 
 
 def tables(result: xr.Dataset) -> list[Table]:
     """Of each measure its figures and contributions; then the samples that failed, and the yield of all limits."""
-    parts, reads = list[Table](), readings(result)
-    for read in reads:
-        parts += _measure_tables(read, read.heading + (f"; limits {read.limits_said}" if read.limited else ""))
+    reads = readings(result)
+    parts = [table for read in reads for table in of_measure(read)]
     yields = _overall(result, reads)
     together = [Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])] if yields else []
     return [*parts, *failed(result), *together]
 
 
-def _measure_tables(read: MeasureReading, title: str) -> list[Table]:
+def of_measure(read: MeasureReading) -> list[Table]:
     """Figures, contributions and Sobol indices, as there are."""
+    title = read.heading + (f"; limits {read.limits_said}" if read.limits_said else "")
     parts = [figures(read).titled(title)]
     if not read.contributions.empty and read.has("contribution_worst_case"):
         parts.append(contributions(read))
     return [*parts, indices(read)] if read.has("total_order") else parts
 
 
-def cells_of(read: MeasureReading) -> dict[str, Cells]:
-    """Nominal, mean, deviation, worst case, RSS, extremes, range, yield and capability, by row and column."""
+def cells_of(read: MeasureReading) -> dict[str, dict[str, str]]:
+    """Nominal, mean, deviation, worst case, RSS, extremes, range, yield and capability: a dict of the texts by column
+    for each row."""
     shift, sigma = read.value("shift_linear"), read.value("deviation_linear")
     middle, rss = read.nominal + shift, read.written("rss")
     at = read.at_place if read.rule in EXTREMES and read.nominal != 0.0 else ""
-    ends = (read.value(key) - read.nominal for key in ("least", "most"))
-    linear = {"mean": "", "sigma": "", "range": ""}
-    if not read.is_size:
-        linear = {"mean": "" if math.isnan(shift) else read.say(middle), "sigma": read.written("deviation_linear"),
-                  "range": read.between(middle - 3 * sigma, middle + 3 * sigma)}  # fmt: skip
-    passed: tuple[str, str, int | None] = ("", "", None)
-    if read.limited and not math.isnan(read.interval[0]):
-        passed = share_parts(*read.interval)
-    worst = {column: read.deviations(*(read.value(f"{key}_{end}") for end in ("lower", "upper")))
-             for column, key in (("linear", "worst_case"), ("searched", "searched"))}  # fmt: skip
-    interval = {key: read.between(read.value(f"{key}_low"), read.value(f"{key}_high")) for key in ("mean", "deviation")}
-    return {
+    passed = share_parts(*read.interval("yield")) if read.limits_said and read.has("yield") else ("", "")
+    rows = {
         "nominal": {"linear": f"{read.written('nominal')}{at}"},
-        "mean": {"linear": linear["mean"], "sampled": read.written("mean"), "interval": interval["mean"]},
-        "deviation σ": {"linear": linear["sigma"], "sampled": read.written("deviation"),
-                        "interval": interval["deviation"]},
-        "worst case": worst,
+        "mean": {"sampled": read.written("mean"), "interval": read.between(*read.interval("mean")[1:])},
+        "deviation σ": {
+            "sampled": read.written("deviation"), "interval": read.between(*read.interval("deviation")[1:])},
+        "worst case": {
+            column: read.deviations(read.value(f"{key}_lower"), read.value(f"{key}_upper"))
+            for column, key in (("linear", "worst_case"), ("searched", "searched"))},
         read.rss_label: {"linear": f"±{rss}" if rss else ""},
-        "extremes": {"sampled": read.written("most") if read.is_size else read.deviations(*ends)},
-        "99.73 % range": {"linear": linear["range"], "sampled": read.between(*read.outer) if read.outer else ""},
+        "extremes": {"sampled": read.deviations(*(read.value(key) - read.nominal for key in ("least", "most")))},
+        "99.73 % range": {"sampled": read.between(*read.outer) if read.outer else ""},
         "yield": {"sampled": passed[0], "interval": passed[1]},
-        **{label: {"sampled": "" if math.isnan(read.value(key)) else number(read.value(key), 3)}
+        **{label: {"sampled": number(read.value(key), 3) if read.has(key) else ""}
            for label, key in (("Cp", "cp"), ("Cpk", "cpk"))},
     }  # fmt: skip
+    if read.is_size:  # not normally distributed about its nominal 0
+        rows["extremes"] = {"sampled": read.written("most")}
+    else:
+        rows["mean"]["linear"] = "" if math.isnan(shift) else read.say(middle)
+        rows["deviation σ"]["linear"] = read.written("deviation_linear")
+        rows["99.73 % range"]["linear"] = read.between(middle - 3 * sigma, middle + 3 * sigma)
+    return rows
 
 
 def figures(read: MeasureReading) -> Table:
@@ -110,28 +102,33 @@ def figures(read: MeasureReading) -> Table:
     rows = {label: cells for label, cells in cells_of(read).items() if any(cells.values())}
     if not rows:
         return Table("results", ["", "linear"], [["nominal", "undefined"]])
-    columns = [key for key in COLUMNS if any(cells.get(key) for cells in rows.values())]
     independent = read.result.attrs.get("sampling", "monte-carlo") == "monte-carlo"
     heads = COLUMNS | {"sampled": "Monte Carlo" if independent else "quasi-Monte Carlo"}
-    return Table("results", ["", *(heads[key] for key in columns)],
-                 [[label, *(cells.get(key, "") for key in columns)] for label, cells in rows.items()])  # fmt: skip
+    texts = [[label, *(cells.get(key, "") for key in heads)] for label, cells in rows.items()]
+    return Table("results", ["", *heads.values()], texts).without_empty()
+
+
+def largest(read: MeasureReading, most: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """At most so many contributions that have a row or bar of their own, and the rest."""
+    rows = read.contributions
+    sizes = rows[["worst_share", "rss_share", "variance_share"]].abs().max(axis=1).fillna(0.0)
+    count = max(min(int((sizes >= LEAST).sum()), most), 1)
+    return rows[:count], rows[count:]
 
 
 def contributions(read: MeasureReading) -> Table:
     """Each toleranced number: its limits, sensitivity, worst case and shares, the largest first; the small ones are
     counted."""
-    large, rest = read.largest(MOST_ROWS)
+    large, rest = largest(read, MOST_ROWS)
     shares = {"share": "worst_share", "of RSS²": "rss_share"}
     if ((read.contributions["variance_share"] - read.contributions["rss_share"]).abs() > APART).any():
         shares["of variance"] = "variance_share"
-    rows = [
-        [row.short, row.limits, read.slope(row), read.say(row.worst), *(share(row[key], 1) for key in shares.values())]
-        for _, row in large.iterrows()
-    ]
+    rows = [[row.short, row.limits, row.slope, read.say(row.worst), *(share(row[key], 1) for key in shares.values())]
+            for _, row in large.iterrows()]  # fmt: skip
     if len(rest):
         effect = "no effect" if (rest["worst"] == 0).all() else "small"
-        sums = (share(rest[key].sum(), 1) for key in shares.values())
-        rows.append([f"{len(rest)} others, {effect}", "", "", "", *sums])
+        rows.append([f"{len(rest)} others, {effect}", "", "", "",
+                     *(share(rest[key].sum(), 1) for key in shares.values())])  # fmt: skip
     head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     return Table(f"contributions to {read.name}{read.at_place}", head, rows)
 
@@ -143,11 +140,8 @@ def indices(read: MeasureReading) -> Table:
     every = np.argsort(-total, kind="stable").tolist()
     order = [j for j in every if total[j] >= LEAST_INDEX] or every[:1]
     ends = [[read.row(f"{key}{end}") for end in ("", "_low", "_high")] for key in ("first_order", "total_order")]
-    rows = [
-        [read.contributions["short"][paths[j]],
-         *(share_interval(*(float(row[j]) for row in key)).replace("-", "−") for key in ends)]
-        for j in order
-    ]  # fmt: skip
+    rows = [[read.contributions["short"][paths[j]], *(share_interval(*(float(row[j]) for row in key)) for key in ends)]
+            for j in order]  # fmt: skip
     rows += [[f"{len(paths) - len(order)} others", "", ""]] if len(order) < len(paths) else []
     return Table(f"Sobol indices of {read.name}", ["share of the variance", "alone", "with interactions"], rows)
 
@@ -181,18 +175,20 @@ def overview(reads: Sequence[MeasureReading]) -> Table:
 
 
 def failed(result: xr.Dataset) -> list[Table]:
-    """Samples without figures, by cause; no table if there are none."""
-    causes = failures(result)
-    if not causes or not causes[0][1]:
+    """Samples without figures, by cause, all together first; no table if there are none."""
+    if "failed" not in result or not result["failed"].any():
         return []
+    tally = dict(zip(names(result, "cause"), np.asarray(result["failed"].values).astype(int).tolist(), strict=True))
+    tally = {"all": tally.pop("all", sum(tally.values())), **tally}
     count = int(result["samples"].values) if "samples" in result else 0
-    rows = [[cause, f"{n:,}", share(n / count, 2) if count else ""] for cause, n in causes]
+    rows = [[cause.replace("_", " ").split(":")[0], f"{n:,}", share(n / count, 2) if count else ""]
+            for cause, n in tally.items() if n]  # fmt: skip
     return [Table("failed samples: outside every limit, excluded from mean and quantiles", ["", "samples", ""], rows)]
 
 
 def _overall(result: xr.Dataset, reads: Sequence[MeasureReading]) -> tuple[float, float, float] | None:
     """The yield of all limits and its interval, where more than one measure has limits."""
-    if "yield_all" not in result or sum(read.limited for read in reads) < 2:
+    if "yield_all" not in result or sum(bool(read.limits_said) for read in reads) < 2:
         return None
     value, low, high = (float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high"))
     return None if math.isnan(value) else (value, low, high)
@@ -218,7 +214,7 @@ LIMIT = Look("limit", 1.3, "dotted", order=3)
 FEWEST, MOST = 20, 60  # bars of a histogram
 READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
 INSIDE = 0.14  # share of a bar that holds its number
-NAME = 34  # characters of a name beside a bar
+NAME = 34  # characters of a name beside a bar: the end of a longer one, by which those of one folder differ
 
 
 def histogram(read: MeasureReading) -> Panel:
@@ -230,49 +226,45 @@ def histogram(read: MeasureReading) -> Panel:
     shift, title = 0.0, f"{read.name}{read.in_unit}"
     if 0 < high - low <= READABLE * abs(read.nominal) or (low == high and read.nominal):
         shift, title = read.nominal, f"deviation of {read.name} from nominal {read.say(read.nominal)}{read.in_unit}"
-
-    def place(value: Any) -> Any:
-        return (value - shift) * read.factor
-
     limits = [read.nominal + end for end in read.room]
-    width = high - low or abs(high) or 1.0
-    ends = [end for end in (low, high, read.nominal, *limits) if low - width < end < high + width]  # no limit far away
     x = np.unique([*bins, *np.clip(limits, low, high)])  # the bars, cut at the limits
     sizes = heights[np.clip(np.searchsorted(bins, x, side="right") - 1, 0, len(heights) - 1)]
-    kept = (
-        ((x[:-1] + x[1:]) / 2 >= limits[0]) & ((x[:-1] + x[1:]) / 2 <= limits[1]) if x.size > 1 else np.empty(0, bool)
-    )
-    inside = np.append(kept, kept[-1:]) if x.size > 1 else np.ones(1, bool)
-    zero, name, marks = np.zeros(len(x)), "samples", list[Mark]()
-    if read.limited:
-        name = f"within {share_interval(*read.interval)}"
-        lost = "beyond, or failed," if any(n for _, n in failures(read.result)) else "beyond"
-        text = (
-            None if read.interval[0] == 1.0 else f"{lost} {share(1 - read.interval[0], share_parts(*read.interval)[2])}"
-        )
-        marks.append(Band(place(x), zero, np.where(inside, 0.0, sizes), text, Look(BEYOND), steps=True))
-    marks.insert(0, Band(place(x), zero, np.where(inside, sizes, 0.0), name, Look(WITHIN, order=2.1), steps=True))
-    lines: list[tuple[float, str | None, Look]] = []
-    finite = [limit for limit in limits if math.isfinite(limit)]
-    text = f"limit{'s' if len(finite) > 1 else ''} {read.limits_said}"
-    lines += [(limit, None if k else text, LIMIT) for k, limit in enumerate(finite)]
+    inside = np.ones(len(x), bool)
+    if len(x) > 1:
+        middles = (x[:-1] + x[1:]) / 2
+        inside = np.append((middles >= limits[0]) & (middles <= limits[1]), False)
+        inside[-1] = inside[-2]
+    passed, zero = read.interval("yield"), np.zeros(len(x))
+    name = f"within {share_interval(*passed)}" if read.limits_said else "samples"
+    places = (x - shift) * read.factor
+    marks: list[Mark] = [Band(places, zero, np.where(inside, sizes, 0.0), name, Look(WITHIN, order=2.1), steps=True)]
+    if read.limits_said:
+        lost = "beyond, or failed," if failed(read.result) else "beyond"
+        text = None if passed[0] == 1.0 else f"{lost} {share(1 - passed[0])}"
+        marks.append(Band(places, zero, np.where(inside, 0.0, sizes), text, Look(BEYOND), steps=True))
+    ends, finite = read.outer or (), [limit for limit in limits if math.isfinite(limit)]
+    lines = [(limit, f"limit{'s' * (len(finite) > 1)} {read.limits_said}", LIMIT) for limit in finite]
     if read.has("nominal") and not read.is_size:
         lines.append((read.nominal, f"nominal {read.say(read.nominal)}", Look("ink", 1.3, order=3)))
     lines.append((read.value("mean"), f"mean {read.say(read.value('mean'))}", Look("ink", 1.3, "long", order=3)))
-    for k, end in enumerate(read.outer or ()):
-        text = f"99.73 %: {' to '.join(map(read.say, read.outer or ()))}"
-        lines.append((end, None if k else text, Look("muted", 1.0, "short", order=3)))
-    marks += [Rule(place(at), text_of, look) for at, text_of, look in lines]
-    margin = 0.04 * (max(ends) - min(ends))
-    across = Axis(title, (place(min(ends) - margin), place(max(ends) + margin)))
+    lines += [(end, f"99.73 %: {' to '.join(map(read.say, ends))}", Look("muted", 1.0, "short", order=3))
+              for end in ends]  # fmt: skip
+    before = [text for _, text, _ in lines]
+    marks += [Rule((at - shift) * read.factor, text if text not in before[:k] else None, look)
+              for k, (at, text, look) in enumerate(lines)]  # fmt: skip
+    width = high - low or abs(high) or 1.0
+    near = [end for end in (low, high, read.nominal, *limits) if low - width < end < high + width]  # no limit far away
+    margin = 0.04 * (max(near) - min(near))
+    across = Axis(title, ((min(near) - margin - shift) * read.factor, (max(near) + margin - shift) * read.factor))
     upward = Axis("samples", (0, 1.06 * max(float(heights.max(initial=0.0)), 1.0)))
     return Panel("", [Chart(across, upward, marks)])
 
 
 def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
     """Share of each number in the sum of squares, sorted, with the running total, and beside it in the worst case."""
-    large, rest = read.largest(most)
-    labels = [f"{ending(row.short, NAME)}  {row.limits}".rstrip() for _, row in large.iterrows()]
+    large, rest = largest(read, most)
+    labels = [f"{row.short if len(row.short) <= NAME else f'…{row.short[1 - NAME :]}'}  {row.limits}".rstrip()
+              for _, row in large.iterrows()]  # fmt: skip
     labels += [f"{len(rest)} others"] if len(rest) else []
     rss, worst = (100 * np.array([*large[key], *([rest[key].sum()] if len(rest) else [])], float)
                   for key in ("rss_share", "worst_share"))  # fmt: skip
@@ -290,11 +282,6 @@ def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
     side = Axis("", (len(labels) - 0.4, -0.6), list(enumerate(labels)))  # names down the side, the largest on top
     chart = Chart(across, side, marks, legend=Legend(room=44), bare=True)
     return Panel("", [chart], max(1.4 + 0.34 * len(labels), 2.6))
-
-
-def ending(name: str, most: int) -> str:
-    """A name of so many characters: the end of a longer one, by which those of one folder differ."""
-    return name if len(name) <= most else f"…{name[1 - most :]}"
 
 
 def envelope(read: MeasureReading) -> Panel:
@@ -372,26 +359,24 @@ def figure(result: xr.Dataset, kind: str | None = None, measures: Sequence[str] 
         what, remedy = (f" '{kind}'", KINDS[kind].remedy) if kind else ("", "add --method linear")
         raise MechanismError(Finding(f"no measure has a figure{what}", "--kind", remedy))
     if kind is not None:
-        return _of_kind(KINDS[kind], reads)
+        return _of_kind(kind, reads)
     if len(reads) == 1:
         panels = [replace(KINDS[name].panel(reads[0]), title=KINDS[name].title) for name in drawable(reads[0])]
         return Plot(reads[0].heading, panels, 2)
     kinds = [name for name, about in KINDS.items() if any(about.ready(read) for read in reads)]
     height, panels = max(min(3.3, TALL / len(reads)), SHORT), []
-    for read in reads:
-        for name in kinds:
-            about = KINDS[name]
-            panel = Panel("", [])
-            if about.ready(read):
-                panel = contribution_bars(read, FEW_BARS) if name == "contributions" else about.panel(read)
-            panels.append(replace(panel, title=f"{read.name}: {about.title.lower()}", height=height))
+    for read, name in product(reads, kinds):
+        panel = Panel("", [])
+        if KINDS[name].ready(read):
+            panel = contribution_bars(read, FEW_BARS) if name == "contributions" else KINDS[name].panel(read)
+        panels.append(replace(panel, title=f"{read.name}: {KINDS[name].title.lower()}", height=height))
     return Plot("Effect of the tolerances", panels, len(kinds))
 
 
-def _of_kind(about: Kind, reads: Sequence[MeasureReading]) -> Plot:
+def _of_kind(kind: str, reads: Sequence[MeasureReading]) -> Plot:
     """One kind of figure of some measures, a panel for each."""
-    title = about.title if len(reads) > 1 else f"{about.title}: {reads[0].name}"
-    return Plot(title, [replace(about.panel(read), title=read.heading) for read in reads])
+    title = KINDS[kind].title if len(reads) > 1 else f"{KINDS[kind].title}: {reads[0].name}"
+    return Plot(title, [replace(KINDS[kind].panel(read), title=read.heading) for read in reads])
 
 
 # ---- report -------------------------------------------------------------------------------------------------------
@@ -411,9 +396,9 @@ def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tol
     about = f"All limits together: yield {share_interval(*yields)}" if yields else ""
     parts = [Section("Measures", about, tables=[overview(reads), *failed(result)]), *first]
     for read in reads:
-        about = "; ".join(part for part in (read.text, f"limits {read.limits_said}" if read.limited else "") if part)
-        pictures = [(f"{KINDS[kind].title} of {read.name}", _of_kind(KINDS[kind], [read])) for kind in drawable(read)]
-        shown, after = (own := _measure_tables(read, "results"))[:2], own[2:]
-        parts.append(Section(read.name, about, pictures, shown, [*after, *corners(read)]))
+        about = f"{read.text}; limits {read.limits_said}" if read.limits_said else read.text
+        pictures = [(f"{KINDS[kind].title} of {read.name}", _of_kind(kind, [read])) for kind in drawable(read)]
+        first_two, after = (all_tables := [figures(read), *of_measure(read)[1:]])[:2], all_tables[2:]
+        parts.append(Section(read.name, about, pictures, first_two, [*after, *corners(read)]))
     end = [Section("Toleranced parameters", tables=[inputs(reads[0])])]
     return page(result, kicker, facts, parts, missed=missed, end=end)

@@ -6,7 +6,7 @@ A chart has two axes and marks, drawn in order. Colours are numbers of the palet
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.views.axis import Abscissa, Array, ease, intervals, peak, usual_peak
+from trunnion.views.axis import Abscissa, Array, abscissa, ease, intervals, peak, usual_peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -283,8 +283,9 @@ def outside(most: float, unit: str) -> Note:
 
 
 def over_drive(
-    result: xr.Dataset, over: Abscissa, title: str, unit: str, lines: Sequence[Line], *, bands: Sequence[Band] = (),
-    marks: Sequence[Mark] = (), rate: str = "", scale: tuple[float, str] | None = None, **chart: Any,
+    result: xr.Dataset, title: str, unit: str, curves: Sequence[Line] | Mapping[str, Array], *,
+    bands: Sequence[Band] = (), marks: Sequence[Mark] = (), rate: str = "", scale: tuple[float, str] | None = None,
+    **chart: Any,
 ) -> Chart:  # fmt: skip
     """Curves of one unit over the drive, in the unit in which they read best.
 
@@ -294,14 +295,17 @@ def over_drive(
     Parameters
     ----------
     result : whose positions without an answer are shaded
-    over : what it is drawn over
     title : of the axis, without the unit
-    lines, bands : in SI
+    curves : in SI; values by their names get the colours of their order
+    bands : in SI
     marks : beside, in the unit of the chart
     rate : what follows the unit, as "/s"
     scale : factor and unit, instead of those that fit
     chart : more of the chart
     """
+    over = abscissa(result)
+    lines = [Line(over.values, values, name, nth(k), close=True) for k, (name, values) in enumerate(curves.items())] \
+        if isinstance(curves, Mapping) else curves  # fmt: skip
     rows = [*(line.y for line in lines), *(edge for band in bands for edge in (band.low, band.high))]
     usual, most = usual_peak(ease(result), *rows), peak(*rows)
     factor, label = scale or prefixed(usual, unit)
@@ -315,8 +319,8 @@ def over_drive(
         cut.append(outside(most, unit + rate))
     elif 1e-9 * most * factor < varies < RIPPLE * most * factor:
         y, zero = replace(y, margin=0.1, count=5), False
-    drawn = [line.times(factor) for line in lines]
     areas = [band._replace(low=band.low * factor, high=band.high * factor) for band in bands]
+    drawn = [line.times(factor) for line in lines]
     return Chart(over, y, [*silent(result, over), *areas, *drawn, *marks, *cut], zero, **chart)
 
 

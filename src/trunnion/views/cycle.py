@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -81,12 +81,6 @@ def _stack(title: str, charts: Sequence[Chart], parts: Sequence[float] = ()) -> 
     return Plot(title, [Panel("", charts, 0.6 + HEIGHT * len(charts) if len(charts) > 1 else 3.75, parts)])
 
 
-def _lines(over: Abscissa, courses: Mapping[str, Array], width: float = 1.6) -> list[Line]:
-    """A curve for every course, in the colours of their order."""
-    return [Line(over.values, course, name, nth(k).but(width=width), close=True)
-            for k, (name, course) in enumerate(courses.items())]  # fmt: skip
-
-
 def _varies(values: Array, least: float) -> bool:
     finite = values[np.isfinite(values)]
     return bool(finite.size) and float(np.ptp(finite)) > least
@@ -97,24 +91,25 @@ def _varies(values: Array, least: float) -> bool:
 
 def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as bars."""
-    over, charts, nouns = abscissa(result), list[Chart](), dict[str, None]()
+    x, charts, nouns = abscissa(result).values, list[Chart](), set[str]()
     efforts, lows, highs = (members(result, f"drive_effort{end}", "driver") for end in ("", "_lower", "_upper"))
     free = {} if ideal is None else members(ideal, "drive_effort", "driver")
     for (driver, effort), unit in zip(efforts.items(), units_along(result["drive_effort"], "driver"), strict=True):
         noun = "force" if unit == "N" else "torque"
-        nouns[noun] = None
-        lines = [Line(over.values, effort, "with friction" if driver in free else noun, Look(0, 2.0), close=True)]
+        nouns.add(noun)
+        lines = [Line(x, effort, "with friction" if driver in free else noun, Look(0, 2.0), close=True)]
         if driver in free:
-            lines.append(Line(over.values, free[driver], "without friction", FREE, close=True))
+            lines.append(Line(x, free[driver], "without friction", FREE, close=True))
         if driver in lows:
             low, high = lows[driver], highs[driver]
             wide = high - low > SEEN * usual_peak(ease(result), low, high)
             if wide.any():
                 middle, half = np.where(wide, (low + high) / 2, np.nan), (high - low) / 2
                 look = Look(0, 2.0, "none", alpha=0.35)
-                lines.append(Line(over.values, middle, "range, friction at rest", look, half, half))
-        charts.append(over_drive(result, over, f"{noun} {driver}", unit, lines))
-    return _stack(f"Drive {'effort' if len(nouns) != 1 else ''.join(nouns)}", charts or [Chart(over, Axis(), [])])
+                lines.append(Line(x, middle, "range, friction at rest", look, half, half))
+        charts.append(over_drive(result, f"{noun} {driver}", unit, lines))
+    title = f"Drive {nouns.pop() if len(nouns) == 1 else 'effort'}"
+    return _stack(title, charts or [Chart(abscissa(result), Axis(), [])])
 
 
 def varying(result: xr.Dataset) -> dict[str, tuple[Array, str]]:
@@ -130,49 +125,44 @@ def varying(result: xr.Dataset) -> dict[str, tuple[Array, str]]:
 
 def speed(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Speed of the drivers over the cycle, where it varies: of a stated motion law, or of a steady cycle."""
-    over, speeds = abscissa(result), varying(result)
+    speeds = varying(result)
     if not speeds:
         what, remedy = "the speed of no driver varies", "use `trunnion simulate --steady`, or a motion law"
         raise MechanismError(Finding(what, "speed", remedy))
-    return _stack("Speed", [
-        over_drive(result, over, f"speed {name}", unit, [Line(over.values, values, name, Look(0, 2.0), close=True)])
-        for name, (values, unit) in speeds.items()
-    ])  # fmt: skip
+    return _stack("Speed", [over_drive(result, f"speed {name}", unit, {name: values})
+                            for name, (values, unit) in speeds.items()])  # fmt: skip
 
 
 def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Power lost to friction in each joint and in all, with the mean of each over the run."""
-    over, losses_of = abscissa(result), members(result, "friction_power", "joint")
-    rubbing = {joint: values for joint, values in losses_of.items() if peak(values) > 0}
-    total = np.sum(list(rubbing.values()), axis=0) if rubbing else np.zeros(over.values.size)
+    x, lost = abscissa(result).values, members(result, "friction_power", "joint")
+    rubbing = {joint: values for joint, values in lost.items() if peak(values) > 0}
+    total = np.sum(list(rubbing.values()), axis=0) if rubbing else np.zeros(x.size)
     factor, unit = prefixed(usual_peak(ease(result), total), "W")
     means = {joint: mean_friction(result, joint) for joint in rubbing}
-
-    def named(text: str, mean: float) -> str:
-        return f"{text}, mean {number(mean * factor)} {unit}" if np.isfinite(mean) else f"{text}, not solved"
-
-    every = Line(over.values, total, named("all joints", sum(means.values())), Look("ink", 1.8), close=True)
-    lines = [line._replace(name=named(str(line.name), means[str(line.name)]))
-             for line in _lines(over, losses_of, 1.4) if line.name in rubbing]  # fmt: skip
-    area = Band(over.values, np.zeros(total.size), total, None, Look("shade", alpha=0.6, order=1.0), close=True)
-    return _stack("Friction power by joint", [
-        over_drive(result, over, "friction power", "W", [every, *lines], bands=[area], scale=(factor, unit))
-    ])  # fmt: skip
+    rows = [("all joints", total, sum(means.values()), Look("ink", 1.8))]
+    rows += [(joint, row, means[joint], nth(k).but(width=1.4)) for k, (joint, row) in enumerate(lost.items())
+             if joint in rubbing]  # fmt: skip
+    lines = [Line(x, row, f"{text}, {f'mean {number(mean * factor)} {unit}' if np.isfinite(mean) else 'not solved'}",
+                  look, close=True) for text, row, mean, look in rows]  # fmt: skip
+    area = Band(x, np.zeros(x.size), total, None, Look("shade", alpha=0.6, order=1.0), close=True)
+    chart = over_drive(result, "friction power", "W", lines, bands=[area], scale=(factor, unit))
+    return _stack("Friction power by joint", [chart])
 
 
 def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Where the power goes: drive, useful, friction, and the remainder that masses and other loads take or give."""
-    over, useful = abscissa(result), column(result, "useful_power")
     drive, lost = (np.sum(list(members(result, name, dim).values()), axis=0)
                    for name, dim in (("drive_power", "driver"), ("friction_power", "joint")))  # fmt: skip
+    useful = column(result, "useful_power")
     useful = np.zeros_like(lost) if useful is None else useful
     rest = drive - useful - lost
     parts = [("drive", drive, Look(0)), ("useful", useful, Look(2)), ("friction", lost, Look(1))]
     if peak(rest) > 1e-9 * peak(drive, useful, lost):
         label = "masses, springs and other loads" if "spring" in result.dims else "masses and other loads"
         parts.append((label, rest, Look("muted", 1.2, "short")))
-    lines = [Line(over.values, values, name, look, close=True) for name, values, look in parts]
-    return _stack("Power over the run", [over_drive(result, over, "power", "W", lines)])
+    lines = [Line(abscissa(result).values, values, name, look, close=True) for name, values, look in parts]
+    return _stack("Power over the run", [over_drive(result, "power", "W", lines)])
 
 
 # ---- reactions ----------------------------------------------------------------------------------------------------
@@ -181,24 +171,20 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Magnitude of the reaction in each joint, in space also of its moment, and the larger load on the ends of each
     bearing; without friction thin, dotted."""
-    over, joints, charts = abscissa(result), names(result, "joint"), []
+    x, joints, charts = abscissa(result).values, names(result, "joint"), []
     parts = [("magnitude of the reaction", "reaction_force", "N")]
     if is_spatial(result):
         parts = [("force of the reaction", "reaction_force", "N"), ("moment of the reaction", "reaction_moment", "N m")]
-    parts += [("larger load on an end", "end_load", "N")] if "end_load" in result else []
-
-    def sizes(of: xr.Dataset, variable: str) -> dict[str, Array]:
-        if variable == "end_load":
-            return {joint: size for joint in joints if (size := larger_end(of, joint)) is not None}
-        return {joint: np.linalg.norm(values, axis=0) for joint, values in members(of, variable, "joint").items()}
-
-    for title, variable, unit in parts:
-        lines = [Line(over.values, size, joint, nth(joints.index(joint)), close=True)
-                 for joint, size in sizes(result, variable).items()]  # fmt: skip
-        free = [] if ideal is None else sizes(ideal, variable).values()
-        lines += [Line(over.values, size, None if k else "without friction", FREE, close=True)
-                  for k, size in enumerate(free)]  # fmt: skip
-        charts.append(over_drive(result, over, title, unit, lines))
+    for title, variable, unit in [*parts, ("larger load on an end", "end_load", "N")]:
+        lines = list[Line]()
+        for of in (result,) if ideal is None else (result, ideal):
+            for joint, vector in members(of, variable, "joint").items():
+                size = np.linalg.norm(vector, axis=0) if variable != "end_load" else larger_end(of, joint)
+                name = joint if of is result else None if lines[-1].look == FREE else "without friction"
+                look = nth(joints.index(joint)) if of is result else FREE
+                lines += [Line(x, size, name, look, close=True)] if size is not None else []
+        if lines or variable != "end_load":
+            charts.append(over_drive(result, title, unit, lines))
     return _stack("Joint reactions", charts)
 
 
@@ -251,35 +237,29 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
 def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Angles of the turning links, in space of the joints, slides of the sliding joints, and their rates."""
-    over, facts, panels = abscissa(result), layout(result), list[Panel]()
-    kinds = {name: facts["joints"].get(name, {}).get("type") for name in names(result, "joint")}
-
-    def moves(values: Array) -> bool:
-        """Also where it is known at one position alone."""
-        return np.isfinite(values).sum() == 1 or _varies(values, 1e-9 * max(1.0, peak(values)))
-
-    if is_spatial(result):
-        moving = [(f"joint {noun}", unit, f"joint_{noun}", "joint",
-                   [name for name, course in members(result, f"joint_{noun}", "joint").items()
-                    if getattr(PAIRS[kinds[name]], freedom) and moves(course)])
-                  for noun, unit, freedom in (("rotation", "rad", "turns"), ("slide", "m", "slides"))]  # fmt: skip
-    else:
-        turning = [link for link, angle in members(result, "link_angle", "link").items()
-                   if link != facts["ground"] and moves(angle)]  # fmt: skip
-        sliding = [name for name, kind in kinds.items() if kind in GUIDED]
-        moving = [("angle", "rad", "link_angle", "link", turning), ("slide", "m", "joint_slide", "joint", sliding)]
-    for noun, unit, variable, dim, of in [part for part in moving if part[-1]] or moving[:1]:
+    facts, x, panels = layout(result), abscissa(result).values, list[Panel]()
+    pairs = {name: PAIRS[facts["joints"][name]["type"]] for name in names(result, "joint")}
+    parts = [("joint rotation", "rad", "joint_rotation", "joint", {name for name in pairs if pairs[name].turns}),
+             ("joint slide", "m", "joint_slide", "joint", {name for name in pairs if pairs[name].slides})]  # fmt: skip
+    if not is_spatial(result):
+        links, guides = set(facts["links"]) - {facts["ground"]}, {name for name in pairs if pairs[name].guided}
+        parts = [("angle", "rad", "link_angle", "link", links), ("slide", "m", "joint_slide", "joint", guides)]
+    for noun, unit, variable, dim, of in parts:
+        moving = [name for name, course in members(result, variable, dim).items() if name in of
+                  and (np.isfinite(course).sum() == 1 or _varies(course, 1e-9 * max(1.0, peak(course)))
+                       or (dim, noun) == ("joint", "slide"))]  # fmt: skip
+        if not moving and (panels or unit == "rad"):
+            continue
         charts = []
         for suffix, rate in RATES.items():
-            rows = {name: values for name, values in members(result, variable + suffix, dim).items() if name in of}
+            rows = {name: values for name, values in members(result, variable + suffix, dim).items() if name in moving}
             turn = TURN if unit == "rad" and not rate else 0.0
+            lines = [Line(x, row, name, nth(k), close=True, turn=turn) for k, (name, row) in enumerate(rows.items())]
             scale = (1.0, unit) if rate else None
             if unit == "m":  # as the drive
                 scale = scaled(usual_peak(ease(result), *rows.values()), "m")
-            charts.append(over_drive(
-                result, over, suffix[1:] or noun, unit, [line._replace(turn=turn) for line in _lines(over, rows)],
-                rate=rate, scale=scale, legend=None if rate else Legend(1),
-            ))  # fmt: skip
+            charts.append(over_drive(result, suffix[1:] or noun, unit, lines, rate=rate, scale=scale,
+                                     legend=None if rate else Legend(1)))  # fmt: skip
         panels.append(Panel("", charts, 5.8))
     return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
 
@@ -293,17 +273,17 @@ def drawn_measures(result: xr.Dataset) -> list[int]:
 
 def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """The model's measures over the drive: a panel for each course, with the figures of all measures of it."""
-    rows, over, charts = drawn_measures(result), abscissa(result), list[Chart]()
+    rows, charts = drawn_measures(result), list[Chart]()
     if not rows:
         what = "there is no measure with one number at every position"
         raise MechanismError(Finding(what, "measures", "state measures: in the model"))
     units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
     texts, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
     labels, values, figures = names(result, "measure"), result["measure_value"].values, result["measure_figure"].values
-    for i in rows:
+    while rows:
+        i = rows[0]
         same = [k for k in rows if units[k] == units[i] and np.array_equal(values[k], values[i], equal_nan=True)]
-        if i != same[0]:
-            continue
+        rows = [k for k in rows if k not in same]
         title = labels[i] if len(same) == 1 else texts.get(labels[i], "course of the measures")
         scale = (scaled if units[i] == "m" else prefixed)(usual_peak(ease(result), values[i]), units[i])
         marks = list[Mark]()
@@ -313,8 +293,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             text = f"{labels[k]}: {aspect and f'{aspect} '}{quantity(float(figures[k]), figure_units[k])}"
             look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
             marks.append(Rule(figures[k] * scale[0] if level else np.nan, text, look, upright=False))
-        line = Line(over.values, values[i], title, Look(0, 2.0), close=True)
-        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=scale))
+        charts.append(over_drive(result, title, units[i], {title: values[i]}, marks=marks, scale=scale))
     return _stack("Measures", charts)
 
 
@@ -330,19 +309,19 @@ WEAK = 0.02  # of the largest load: a smaller one has no arrow
 def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Errors against the mechanism without any: of the worst points and of the joints of the ground, over the drive."""
     need(result, "errors", "error")
-    over, lost_at = abscissa(result), losses(result)
+    lost_at = losses(result)
     places = np.unique(np.concatenate(list(lost_at.values()))) if lost_at else np.empty(0, int)
-    lost = [Rule(float(over.values[place]), None if k else f"contact lost: {', '.join(lost_at)}",
+    lost = [Rule(float(abscissa(result).values[place]), None if k else f"contact lost: {', '.join(lost_at)}",
                  Look("limit", 0.9, "dotted", order=1.4)) for k, place in enumerate(places)]  # fmt: skip
     # the scale is that of all points: those that are not drawn err less
     scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
-    charts = [over_drive(result, over, "position error", "m", _lines(over, worst_points(result)), scale=scale,
-                         marks=lost, legend=Legend(1))]  # fmt: skip
+    charts = [
+        over_drive(result, "position error", "m", worst_points(result), scale=scale, marks=lost, legend=Legend(1))
+    ]
     for unit, noun in (("rad", "rotation"), ("m", "slide")):
-        errors = {output.joint: output.error for output in outputs(result) if output.unit == unit}
-        if errors:
+        if errors := {output.joint: output.error for output in outputs(result) if output.unit == unit}:
             title = f"transmission error,\n{noun}"
-            charts.append(over_drive(result, over, title, unit, _lines(over, errors), marks=lost, legend=Legend(1)))
+            charts.append(over_drive(result, title, unit, errors, marks=lost, legend=Legend(1)))
     return _stack("Errors of the mechanism as built", charts)
 
 
@@ -487,7 +466,8 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     marks: list[Mark] = [*_states(result, over, named=True), *silent(result, over)]
     of_all, title = np.where(np.isfinite(margin), margin, np.nan), f"locking margin, all friction{never}"
     marks.append(Line(over.values, of_all, title, Look("ink", 2.0), close=True))
-    marks += [line for line in _lines(over, courses, 1.3) if np.isfinite(line.y).any()]
+    marks += [Line(over.values, course, name, nth(k).but(width=1.3), close=True)
+              for k, (name, course) in enumerate(courses.items()) if np.isfinite(course).any()]  # fmt: skip
     marks.append(Rule(1.0, "locks at 1", Look("ink", 1.0, "dashed", order=1.6), upright=False))
     if not largest:  # nothing to draw
         marks.append(Note(f"more than {MARGIN:g} at every position", 0.5, 0.5, size=10, colour="ink"))

@@ -403,9 +403,8 @@ SIDES = np.array([[np.cos(angle), np.sin(angle)] for angle in np.radians(np.aran
 GAPS = (5.0, 8.0, 12.0, 18.0, 26.0)  # points from the place to the name
 FURTHER = 0.07  # what a gap more costs, beside the share of the name's box that is not empty
 DARK = 3.0  # pale bodies count almost as much as lines
-LEAST = 6.0  # points around every place that are its joint's, however pale its symbol is
-EMPTY = 1.5  # points around a name
-CROSSED, CUT, STRAY = 5.0, 100.0, 0.4  # costs of lying on another name, outside the figure, nearer to another place
+LEAST, EMPTY = 6.0, 1.5  # points around every place that are its joint's, however pale its symbol is; around a name
+CROSSED, CUT = 5.0, 100.0  # costs of lying on another name, outside the frame
 
 
 @dataclass
@@ -435,42 +434,38 @@ class Labels:
         self.waiting.append((note, symbol))
 
     def place(self) -> None:
-        """Move every name to where it covers least of what is drawn, and of the names before it."""
+        """Move every name to where, within its axes, it covers least of what is drawn and of the names before it."""
         if not self.waiting:
             return
-        canvas, scale = FigureCanvasAgg(self.figure), self.figure.dpi / 72
+        canvas, scale, spots = FigureCanvasAgg(self.figure), self.figure.dpi / 72, list[Array]()
         canvas.draw()  # type: ignore[no-untyped-call]
         pixels = np.asarray(canvas.buffer_rgba())[::-1, :, :3]  # type: ignore[no-untyped-call]  # rows from below
         dark = np.clip(DARK * (1 - pixels.min(axis=2) / 255), 0, 1)
-        edge, spots = np.array(dark.shape)[::-1], list[Array]()
+
+        def box(middle: Array, half: Array | float) -> tuple[slice, slice]:
+            left, below, right, above = np.maximum(np.rint([*(middle - half), *(middle + half)]).astype(int), 0)
+            return slice(below, above + 1), slice(left, right + 1)
+
         for note, symbol in self.waiting:
             ends = note.axes.transData.transform(np.add([note.xy] * 2, [(0.0, 0.0), (symbol, 0.0)]))  # type: ignore[union-attr]
             spots.append(ends[0])
-            _fill(dark, ends[0], max(LEAST * scale, float(np.hypot(*(ends[1] - ends[0])))), 1.0)
-        for k, (note, _) in enumerate(self.waiting):
+            dark[box(ends[0], max(LEAST * scale, float(ends[1, 0] - ends[0, 0])))] = 1.0
+        for (note, _), spot in zip(self.waiting, spots, strict=True):
             note.set_visible(True)
-            with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", "Glyph")
-                box = note.get_window_extent()
-            half = 0.5 * np.array([box.width, box.height]) + EMPTY * scale
-            others, best = np.array(spots[:k] + spots[k + 1 :]).reshape(-1, 2), (np.inf, np.zeros(2))
+            extent, frame = note.get_window_extent(), note.axes.bbox  # type: ignore[union-attr]
+            half, costs = (
+                0.5 * np.array([extent.width, extent.height]) + EMPTY * scale,
+                dict[tuple[float, float], float](),
+            )
             for far, gap in enumerate(GAPS):
                 for side in SIDES:
-                    offset = gap * scale * side + half * side / np.abs(side).max()
-                    low, high = (np.rint(spots[k] + offset + sign * half).astype(int) for sign in (-1, 1))
-                    beyond = bool(np.any((low < 0) | (high > edge)))
-                    stray = bool(np.any(np.linalg.norm(spots[k] + offset - others, axis=1) < np.hypot(*offset)))
-                    covered = dark[max(low[1], 0) : max(high[1], 1), max(low[0], 0) : max(high[0], 1)]
-                    cost = (covered.mean() if covered.size else 1.0) + FURTHER * far + CUT * beyond + STRAY * stray
-                    best = min(best, (float(cost), offset), key=lambda pair: pair[0])
-            note.set_position(tuple(best[1] / scale))
-            _fill(dark, spots[k] + best[1], half, CROSSED)
-
-
-def _fill(dark: Array, middle: Array, half: Array | float, value: float) -> None:
-    """Make a box of the pixels dark."""
-    low, high = (np.maximum(np.rint(middle + sign * half).astype(int), 0) for sign in (-1, 1))
-    dark[low[1] : high[1], low[0] : high[0]] = value
+                    x, y = spot + gap * scale * side + half * side / np.abs(side).max()
+                    within = frame.contains(x - half[0], y - half[1]) and frame.contains(x + half[0], y + half[1])
+                    covered = dark[box(np.array([x, y]), half)]
+                    costs[x, y] = (float(covered.mean()) if covered.size else 1.0) + FURTHER * far + CUT * (not within)
+            best = np.array(min(costs, key=costs.__getitem__))
+            note.set_position(tuple((best - spot) / scale))
+            dark[box(best, half)] = CROSSED
 
 
 # ---- files --------------------------------------------------------------------------------------------------------

@@ -11,10 +11,7 @@ from as_built_models import EXAMPLES, four_bar, loaded
 
 import trunnion
 from drawn import labels, line
-from trunnion.views.as_built import (
-    losses,
-    seated,
-)
+from trunnion.views.as_built import losses, seated
 from trunnion.views.scene import scene
 from trunnion.views.shown import figure_of
 

@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 from trunnion import Mechanism, analyse
 from trunnion.cli.app import app
 from trunnion.errors import Status
-from trunnion.views.axis import _touched, ease, usual_peak, whole_peaks
+from trunnion.views.axis import _touched
+from trunnion.views.curves import ease, usual_peak, whole_peaks
 from trunnion.views.shown import figure_of
 
 SLIDER_CRANK = """

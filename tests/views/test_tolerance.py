@@ -21,16 +21,7 @@ from trunnion.views.allocation import trade_off
 from trunnion.views.charts import Band, Rule
 from trunnion.views.readings import readings, share_interval
 from trunnion.views.shown import figure_of as figure
-from trunnion.views.tolerance import (
-    KINDS,
-    MOST_PANELS,
-    corners,
-    histogram,
-    indices,
-    inputs,
-    overview,
-    tables,
-)
+from trunnion.views.tolerance import KINDS, MOST_PANELS, corners, histogram, indices, inputs, overview, tables
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -78,8 +78,7 @@ def plot(
     format_: str = "png", uncut: bool = False,
 ) -> None:  # fmt: skip
     """Plot a cycle: torque, friction power, reactions, mechanism."""
-    from trunnion.views.axis import whole_peaks
-    from trunnion.views.charts import check_kind
+    from trunnion.views.curves import check_kind, whole_peaks
     from trunnion.views.cycle import PLOTS, drawable
     from trunnion.views.draw import save
     from trunnion.views.shown import figure_of
@@ -107,7 +106,7 @@ def plot(
 @verb(out="The HTML file to write.")
 def report(model: Model, out: Path, settled: Friction, steps: int = 360, uncut: bool = False) -> None:
     """Write an HTML report: animation, plots, findings, inputs."""
-    from trunnion.views.axis import whole_peaks
+    from trunnion.views.curves import whole_peaks
     from trunnion.views.shown import report_of
 
     check_target(out, "--out", "a report", PAGES)

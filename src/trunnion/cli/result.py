@@ -128,7 +128,7 @@ class Shown:
     @property
     def pictured(self) -> xr.Dataset:
         """The result as pictures show it."""
-        from trunnion.views.axis import whole_peaks
+        from trunnion.views.curves import whole_peaks
 
         return whole_peaks(self.dataset, self.uncut)
 

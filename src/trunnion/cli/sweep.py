@@ -27,7 +27,7 @@ def sweep(
     Efficiency, drive effort, reactions, friction, locking margin and measures of the model.
     """
     from trunnion.studies.sweep import sweep as run
-    from trunnion.views.charts import check_kind
+    from trunnion.views.curves import check_kind
     from trunnion.views.sweep import KINDS, check_axes, check_measure, tables
 
     grid = over(over_)

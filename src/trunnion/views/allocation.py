@@ -13,7 +13,8 @@ from trunnion.results.dataset import units_along
 from trunnion.results.quantities import drawn_in, joined, number
 from trunnion.views import tolerance
 from trunnion.views.axis import names
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe, check_kind
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe
+from trunnion.views.curves import check_kind
 from trunnion.views.page import NONE, Section, Table
 from trunnion.views.readings import is_play, readings, share, share_interval
 

@@ -7,26 +7,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.views.axis import (
-    Array,
-    abscissa,
-    column,
-    is_spatial,
-    layout,
-    mean_friction,
-    members,
-    names,
-    numbers,
-    peak,
-    valid,
-)  # fmt: skip
+from trunnion.views.axis import Array, abscissa, column, is_spatial, layout, members, names, numbers
 from trunnion.views.bodies import Space, gathered
+from trunnion.views.curves import peak
 from trunnion.views.page import NONE
 
 if TYPE_CHECKING:
@@ -176,6 +165,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         return []
     result = without_noise(result)
     over, units, rows = abscissa(result), units_of(result), list[Row]()
+    lost_there = np.asarray(result["status"].values) == Status.CONTACT_LOST  # those positions are not valid
 
     def row(label: str, built: float, ideal: float, unit: str, place: str = "") -> Row:
         change = f"{'+' if built > ideal else ''}{quantity(built - ideal, unit, units)}"
@@ -184,14 +174,14 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         return {"label": label, **ends, "difference": change, "place": place}
 
     def largest(label: str, unit: str, built: Array, ideal: Array | None = None) -> Row:
-        sizes, none = valid(result, built), "" if ideal is None else NONE
+        sizes, none = np.where(lost_there, np.nan, built), "" if ideal is None else NONE
         if not np.isfinite(sizes).any():
             return {"label": label, "built": none, "ideal": none, "difference": NONE, "place": ""}
         index = int(np.nanargmax(np.abs(sizes)))
         place, value = over.say(index), float(sizes[index])
         if ideal is None:
             return {"label": label, "built": "", "ideal": "", "difference": quantity(value, unit), "place": place}
-        other = valid(result, ideal)
+        other = np.where(lost_there, np.nan, ideal)
         return row(label, value, float(np.nanmax(other)) if np.isfinite(other).any() else np.nan, unit, place)
 
     rows += [largest(f"Position error of {key}, largest", "m", size) for key, size in worst_points(result).items()]
@@ -206,8 +196,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
     for joint, force in forces.items():
         sizes = (np.linalg.norm(vector, axis=0) for vector in (force, force - changes[joint]))
         rows.append(largest(f"Reaction of {joint}, largest", "N", *sizes))
-    lost, ideally = (float(sum(mean_friction(result, joint, of) for joint in names(result, "joint")))
-                     for of in ("", "_ideal"))  # fmt: skip
+    lost, ideally = (float(sum(members(result, f"friction_power_mean{of}", "joint").values())) for of in ("", "_ideal"))
     built, free = (
         np.nan if (value := column(result, f"efficiency{of}")) is None else float(value) for of in ("", "_ideal")
     )

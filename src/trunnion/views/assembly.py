@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from trunnion.results.attributes import summary_of
 from trunnion.results.quantities import parts, prefixed, quantity
 from trunnion.views.axis import Abscissa, abscissa, column, names
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe, nth
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe
+from trunnion.views.curves import nth
 from trunnion.views.page import Section, Table, counts, page
 
 if TYPE_CHECKING:

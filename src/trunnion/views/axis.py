@@ -1,8 +1,4 @@
-"""What every view asks of a result first: what to draw it over, where it has no answer, which peaks it may cut.
-
-A peak is cut only next to a dead centre or to locking, where forces have no bound and a curve would flatten all else.
-The peak of a working load is never cut, however short the stroke.
-"""
+"""What every view asks of a result first: what to draw it over, what it holds, where it has no answer."""
 
 from __future__ import annotations
 
@@ -137,12 +133,6 @@ def larger_end(result: xr.Dataset, joint: str) -> Array | None:
     return size if size is not None and np.any(np.isfinite(size)) else None
 
 
-def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
-    """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer."""
-    mean = column(result, f"friction_power_mean{of}", joint=joint)
-    return float("nan") if mean is None else float(mean)
-
-
 def numbers(values: Array) -> list[float | None]:
     """Numbers with seven digits, None for what is not finite."""
     values = np.asarray(values, float)
@@ -191,94 +181,3 @@ def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[In
     edges = [0, *(np.flatnonzero(np.diff(status)) + 1).tolist(), status.size]
     runs = (Interval(start, stop, int(status[start])) for start, stop in pairwise(edges))
     return [run for run in runs if run.status >= lowest]
-
-
-def valid(result: xr.Dataset, values: Array) -> Array:
-    """A column, NaN at positions that are not valid, for a pin loses contact there."""
-    status = column(result, "status")
-    return values if status is None else np.where(status == Status.CONTACT_LOST, np.nan, values)
-
-
-# ---- which peaks are cut --------------------------------------------------------------------------------------------
-
-UNCUT = "uncut"  # attribute of a result whose views cut nothing
-UNBOUNDED = [int(status) for status in (Status.LOCKED, Status.SINGULAR, Status.NOT_ASSEMBLED)]
-BESIDE = [int(Status.NEAR_SINGULAR), *UNBOUNDED]
-
-GROWN = 5.0  # times what is usual: from here on a position may be next to one that has no bound
-CLOSE = 50.0  # so much more friction than without it is close to locking, as a degree of transmission angle is
-FASTEST = 4  # power of 1/distance that efforts grow with at most: those of masses, driven at constant speed
-TOWERS = 4.0  # times the rest: lower peaks are shown whole
-MARGIN = 1.25  # of the rest is shown of those that tower
-
-
-def ease(result: xr.Dataset) -> Array:
-    """(position,): 1, but next to a dead centre or to locking less, by as much as what forces grow with has grown.
-
-    Next to it are positions at which the condition or the friction is GROWN times the usual one, in one run with a
-    position that is near singular, or right beside one that is singular, locked or cannot be assembled.
-    """
-    status = column(result, "status")
-    if status is None or UNCUT in result.attrs:
-        return np.ones(result.sizes["position"])
-    if "condition" not in result:
-        return ease_of_status(result, status)
-    condition, margin = np.asarray(result["condition"].values, float), column(result, "locking_margin")
-    finite = condition[np.isfinite(condition)]
-    friction = np.ones(
-        status.size
-    )  # by how much friction that feeds on its own reactions raises them: ∞ where it locks
-    if margin is not None:
-        more = 1.0 / np.maximum(margin - 1.0, 1e-300)
-        friction = np.where(np.isinf(margin), 1.0, np.where(margin > 1.0, 1.0 + more, 1.0))
-    grown = np.fmax(condition / float(np.median(finite)) if finite.size else 1.0, friction)
-    grown = np.where(np.isfinite(grown), grown, 1.0)
-    unbounded, core = np.isin(status, UNBOUNDED), np.isin(status, BESIDE) | (friction > CLOSE)
-    near = _touched((grown > GROWN) | unbounded, core, abscissa(result).closed) & ~unbounded
-    return np.where(near, GROWN / grown, 1.0)
-
-
-def ease_of_status(result: xr.Dataset, status: NDArray[np.generic]) -> Array:
-    """Where only the status is known: 0 where it is near singular or unbounded, else 1."""
-    return np.where(np.isin(status, BESIDE) & (UNCUT not in result.attrs), 0.0, 1.0)
-
-
-def whole_peaks(result: xr.Dataset, uncut: bool = True) -> xr.Dataset:
-    """The result whose views cut no peak, if that is wanted."""
-    return result.assign_attrs({UNCUT: 1}) if uncut else result
-
-
-def _touched(within: NDArray[np.bool_], core: NDArray[np.bool_], closed: bool) -> NDArray[np.bool_]:
-    """The runs of `within` that hold one of `core`; closed: after the last comes the first."""
-    if within.all():
-        return within & core.any()
-    first = int(np.flatnonzero(~within)[0]) if closed else 0
-    inside, at, marks = np.roll(within, -first), np.roll(core, -first), np.zeros_like(within)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        marks[start:stop] = at[start:stop].any()
-    return np.roll(marks, first)
-
-
-def peak(*columns: Array | None) -> float:
-    """The greatest magnitude in all columns; 0 if none is finite."""
-    sizes = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in columns if values is not None]
-    return float(max(sizes, default=0.0))
-
-
-def usual_peak(easy: Array, *columns: Array | None) -> float:
-    """The magnitude a view should show: the greatest, unless it is next to a dead centre and towers over all others.
-
-    easy: of `ease`, (position,); columns: (…, position). What does not grow towards the dead centre as forces do is a
-    load that works there, and all is shown.
-    """
-    rows = [np.abs(values) for values in columns if values is not None]
-    if not rows:
-        return 0.0
-    shares = np.concatenate([np.broadcast_to(easy, row.shape).ravel() for row in rows])
-    sizes = np.concatenate([row.ravel() for row in rows])
-    finite = np.isfinite(sizes)
-    shares, sizes = shares[finite], sizes[finite]
-    most, rest = float(sizes.max(initial=0.0)), float(sizes[shares == 1.0].max(initial=0.0))
-    works = float((sizes * shares**FASTEST).max(initial=0.0)) > 2.0 * rest
-    return most if works or most <= TOWERS * rest or rest == 0.0 else MARGIN * rest

@@ -6,23 +6,17 @@ A chart has two axes and marks, drawn in order. Colours are numbers of the palet
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Status
-from trunnion.model.names import nearest
-from trunnion.results.quantities import prefixed, quantity
-from trunnion.views.axis import Abscissa, Array, abscissa, ease, intervals, peak, usual_peak
+from trunnion.views.axis import Abscissa, Array
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-RIPPLE = 0.1  # of the largest value: curves that vary by less are shown without 0
-COLOURS, DASHES = 6, ("solid", "long", "short", "dash-dot")  # colours of the palette, then the next dash
+    pass
 
 
 @dataclass(frozen=True)
@@ -49,21 +43,16 @@ class Look:
         return replace(self, **changes)  # type: ignore[arg-type]  # names of fields
 
 
-FREE = Look("ink", 0.9, "dashed")  # without friction, among many curves
-
-
-def nth(index: int) -> Look:
-    """Colour and dash of the n-th of several curves; colours repeat with another dash."""
-    return Look(index, dash=DASHES[index // COLOURS % len(DASHES)])  # type: ignore[arg-type]  # one of the dashes
-
-
 # ---- marks ----------------------------------------------------------------------------------------------------------
 
 
 class Line(NamedTuple):
-    """A curve or, without a dash, points; low, high: lengths of the bars of their uncertainty; steps: constant up to
-    the next point; close: over a whole turn led on to its first value, of what may gain whole turns to that and as
-    many of `turn` as it has gained; shares: places of its points on the scale of colours, from 0 to 1."""
+    """A curve or, without a dash, points.
+
+    low, high: lengths of the bars of their uncertainty; steps: constant up to the next point; close: over a whole turn
+    led on to its first value, of what may gain whole turns to that and as many of `turn` as it has gained; shares:
+    places of its points on the scale of colours, from 0 to 1; arrow: with a head at its end.
+    """
 
     x: Array
     y: Array
@@ -75,6 +64,7 @@ class Line(NamedTuple):
     close: bool = False
     turn: float = 0.0
     shares: Array | None = None
+    arrow: bool = False
 
     def times(self, factor: float) -> Line:
         """The line in another unit."""
@@ -121,14 +111,6 @@ class Stripe(NamedTuple):
     text: str = ""
     look: Look = Look("shade", order=0.5)
     name: str | None = None
-
-
-class Arrow(NamedTuple):
-    """An arrow between two places in the units of the axes."""
-
-    start: tuple[float, float]
-    end: tuple[float, float]
-    look: Look = Look("ink", 1.5)
 
 
 class Ring(NamedTuple):
@@ -190,7 +172,7 @@ class Contours(NamedTuple):
     gaps: Sequence[tuple[str, str, NDArray[np.bool_]]] = ()
 
 
-Mark = Line | Band | Bars | Rule | Stripe | Arrow | Ring | Note | Contours
+Mark = Line | Band | Bars | Rule | Stripe | Ring | Note | Contours
 
 
 # ---- charts ---------------------------------------------------------------------------------------------------------
@@ -263,78 +245,3 @@ class Plot:
     note: str = ""
     shared: bool = False
     colours: ColourScale | None = None
-
-
-def check_kind(kind: str, kinds: Iterable[str]) -> None:
-    """MechanismError if there is no such kind of figure."""
-    if kind not in kinds:
-        hint = nearest(kind, kinds)
-        remedy = hint if hint.startswith("did") else f"use one of {', '.join(kinds)}"
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", remedy))
-
-
-# ---- curves over the drive ------------------------------------------------------------------------------------------
-
-
-def outside(most: float, unit: str) -> Note:
-    """What stands in a chart whose peak is cut off."""
-    text = f"peak {quantity(most, unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
-    return Note(text, 0.99, 0.97, "right", "top", boxed=True)
-
-
-def over_drive(
-    result: xr.Dataset, title: str, unit: str, curves: Sequence[Line] | Mapping[str, Array], *,
-    bands: Sequence[Band] = (), marks: Sequence[Mark] = (), rate: str = "", scale: tuple[float, str] | None = None,
-    **chart: Any,
-) -> Chart:  # fmt: skip
-    """Curves of one unit over the drive, in the unit in which they read best.
-
-    Where positions next to a dead centre tower over all others, the axis ends at what is usual; where all curves stay
-    near one value far from 0, it shows how they vary.
-
-    Parameters
-    ----------
-    result : whose positions without an answer are shaded
-    title : of the axis, without the unit
-    curves : in SI; values by their names get the colours of their order
-    bands : in SI
-    marks : beside, in the unit of the chart
-    rate : what follows the unit, as "/s"
-    scale : factor and unit, instead of those that fit
-    chart : more of the chart
-    """
-    over = abscissa(result)
-    lines = [Line(over.values, values, name, nth(k), close=True) for k, (name, values) in enumerate(curves.items())] \
-        if isinstance(curves, Mapping) else curves  # fmt: skip
-    rows = [*(line.y for line in lines), *(edge for band in bands for edge in (band.low, band.high))]
-    usual, most = usual_peak(ease(result), *rows), peak(*rows)
-    factor, label = scale or prefixed(usual, unit)
-    values = np.concatenate([row.ravel() for row in rows]) * factor if rows else np.empty(0)
-    values = values[np.isfinite(values)]
-    low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
-    varies = float(np.ptp(values)) if values.size else 0.0
-    y, zero, cut = Axis(f"{title} [{label}{rate}]" if label else title), True, list[Mark]()
-    if usual < most:
-        y = replace(y, limits=(1.05 * max(low, -usual * factor), 1.05 * min(high, usual * factor)))
-        cut.append(outside(most, unit + rate))
-    elif 1e-9 * most * factor < varies < RIPPLE * most * factor:
-        y, zero = replace(y, margin=0.1, count=5), False
-    areas = [band._replace(low=band.low * factor, high=band.high * factor) for band in bands]
-    drawn = [line.times(factor) for line in lines]
-    return Chart(over, y, [*silent(result, over), *areas, *drawn, *marks, *cut], zero, **chart)
-
-
-def silent(result: xr.Dataset, over: Abscissa, written: bool = True) -> list[Mark]:
-    """Stripes where positions have no answer, each cause written once; hatched where a pin loses contact."""
-    x, half, marks, causes = over.values, over.half_step, list[Mark](), set[str]()
-    lost = [run for run in intervals(result, Status.CONTACT_LOST) if run.status == Status.CONTACT_LOST]
-    for run in [*lost, *intervals(result)]:
-        low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))
-        hatched = run in lost
-        text = "not valid" if hatched else run.text.split(":")[0]
-        look = Look("shade", hatch="////" if hatched else "", order=0.5)
-        marks.append(Stripe(low - half, high + half, text if written and text not in causes else "", look))
-        causes.add(text)
-        if not hatched:
-            marks += [Rule(end, None, Look("muted", 0.6, "short", order=0.6)) for end in (low - half, high + half)]
-    return marks

@@ -21,21 +21,8 @@ from trunnion.rig.comparison import CAUSES, Verdict
 from trunnion.rig.reading.measurement import Measurement, rms
 from trunnion.views import sweep
 from trunnion.views.axis import Abscissa, Array, names, over_turn
-from trunnion.views.charts import (
-    Axis,
-    Band,
-    Chart,
-    Legend,
-    Line,
-    Look,
-    Mark,
-    Panel,
-    Plot,
-    Stripe,
-    check_kind,
-    nth,
-    silent,
-)  # fmt: skip
+from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe
+from trunnion.views.curves import check_kind, nth, silent
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
 from trunnion.views.sweep import Scale
 

@@ -23,43 +23,9 @@ from trunnion.results.quantities import number, prefixed, quantity, scaled
 from trunnion.results.scales import without_noise
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.as_built import Seats, losses, need, outputs, point_errors, seat_angles, seated, worst_points
-from trunnion.views.axis import (
-    Abscissa,
-    Array,
-    abscissa,
-    column,
-    ease,
-    is_spatial,
-    larger_end,
-    layout,
-    mean_friction,
-    members,
-    names,
-    peak,
-    usual_peak,
-)  # fmt: skip
-from trunnion.views.charts import (
-    FREE,
-    Arrow,
-    Axis,
-    Band,
-    Chart,
-    Legend,
-    Line,
-    Look,
-    Mark,
-    Note,
-    Panel,
-    Plot,
-    Ring,
-    Rule,
-    Stripe,
-    check_kind,
-    nth,
-    outside,
-    over_drive,
-    silent,
-)  # fmt: skip
+from trunnion.views.axis import Array, abscissa, column, is_spatial, larger_end, layout, members, names
+from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, Rule, Stripe
+from trunnion.views.curves import FREE, check_kind, ease, nth, outside, over_drive, peak, silent, usual_peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -139,8 +105,8 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     rubbing = {joint: values for joint, values in lost.items() if peak(values) > 0}
     total = np.sum(list(rubbing.values()), axis=0) if rubbing else np.zeros(x.size)
     factor, unit = prefixed(usual_peak(ease(result), total), "W")
-    means = {joint: mean_friction(result, joint) for joint in rubbing}
-    rows = [("all joints", total, sum(means.values()), Look("ink", 1.8))]
+    means = {joint: float(mean) for joint, mean in members(result, "friction_power_mean", "joint").items()}
+    rows = [("all joints", total, sum(means[joint] for joint in rubbing), Look("ink", 1.8))]
     rows += [(joint, row, means[joint], nth(k).but(width=1.4)) for k, (joint, row) in enumerate(lost.items())
              if joint in rubbing]  # fmt: skip
     lines = [Line(x, row, f"{text}, {f'mean {number(mean * factor)} {unit}' if np.isfinite(mean) else 'not solved'}",
@@ -328,13 +294,13 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Pin in hole for every joint and end: locus of the pin's centre over the drive, marked positions, their loads."""
     need(result, "seats", "seat")
-    over, charts, paired = abscissa(result), list[Chart](), False
+    charts, paired = list[Chart](), False
     for seats in seated(result):
         if seats.planar_guide:  # see `beta`
             continue
         both = [(0, (0, 1)), (0, (0, 2))] if seats.kind == "ball" else [(k, (0, 1)) for k in range(len(seats.offsets))]
         paired |= len(both) == 2  # both ends of a joint stay side by side
-        charts += [_hole(seats, end, plane, over) for end, plane in both]
+        charts += [_hole(seats, end, plane, result) for end, plane in both]
     if not charts:
         what = "the seats are those of guides in the plane"
         raise MechanismError(Finding(what, "--kind seat", "see the figure 'beta'"))
@@ -344,9 +310,9 @@ def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     return Plot("Seats of the pins in their holes", panels, columns, width)
 
 
-def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Chart:
+def _hole(seats: Seats, end: int, plane: tuple[int, int], result: xr.Dataset) -> Chart:
     """Pin in hole: wall, clearance, locus, and at the marked positions the pin with its load."""
-    factor, unit = prefixed(seats.clearance, "m")
+    over, (factor, unit) = abscissa(result), prefixed(seats.clearance, "m")
     rho, offset = seats.clearance * factor, seats.offsets[end, list(plane)] * factor
     force, square, most = seats.forces[end, list(plane)], seats.kind == "guide", seats.peak
     shares = (over.values - float(over.values.min())) / (over.span or 1.0)  # places on the scale of colours
@@ -372,7 +338,8 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Cha
         if np.hypot(*force[:, index]) > WEAK * most:
             start = place * (1 + PIN * rho / size) if size > 1e-9 * rho else place
             tip = start + force[:, index] / most * ARROW * rho
-            marks.append(Arrow((start[0], start[1]), (tip[0], tip[1]), paint.but(width=1.5, order=6.0)))
+            path = np.stack([start, tip], axis=1)
+            marks.append(Line(path[0], path[1], None, paint.but(width=1.5, order=6.0), arrow=True))
             marks.append(Note(over.say(index), tip[0], tip[1], data=True, size=7.5, beside=True))
     slack = seats.offsets[end, 2] * factor if seats.along > 0 else np.empty(0)
     if np.isfinite(slack).any():
@@ -463,7 +430,7 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     reached = bool(np.any(np.isinf(every))) or largest >= MARGIN
     never = f": more than {MARGIN:g}" if not np.isfinite(margin).any() else ""
     courses = {f"{joint} alone": np.where(np.isfinite(row), row, np.nan) for joint, row in alone.items()}
-    marks: list[Mark] = [*_states(result, over, named=True), *silent(result, over)]
+    marks: list[Mark] = [*_states(result, named=True), *silent(result, over)]
     of_all, title = np.where(np.isfinite(margin), margin, np.nan), f"locking margin, all friction{never}"
     marks.append(Line(over.values, of_all, title, Look("ink", 2.0), close=True))
     marks += [Line(over.values, course, name, nth(k).but(width=1.3), close=True)
@@ -485,17 +452,17 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             lines.append(Line(over.values, values, name, look, close=True))
     low = min((float(np.nanmin(line.y)) for line in lines if np.isfinite(line.y).any()), default=0.0)
     lower = Chart(over, Axis("efficiency [%]", (min(0.0, max(1.05 * low, -105.0)), 103.0)),
-                  [*_states(result, over, named=False), *silent(result, over), *lines], zero=True)  # fmt: skip
+                  [*_states(result, named=False), *silent(result, over), *lines], zero=True)  # fmt: skip
     centred = "; ranges: pins centred" * ("seat_offset" in result and "locking_state" in result)
     return _stack(f"Locking by friction{centred}", [upper, lower], (3, 2) if largest else (1, 2))
 
 
-def _states(result: xr.Dataset, over: Abscissa, named: bool) -> list[Mark]:
+def _states(result: xr.Dataset, named: bool) -> list[Mark]:
     """The ranges of a result of `locking`, in their colours, and where the drive effort changes sign; named: for the
     legend."""
     if "locking_state" not in result:
         return []
-    time, values = result["time"].values, over.values
+    time, values = result["time"].values, abscissa(result).values
     if len(time) > 1:  # a motion that comes again has ranges beyond its last position
         time, values = (np.append(row, 2 * row[-1] - row[-2]) for row in (time, values))
     rows = [row for row in attribute(result, "locking_ranges", '{"rows": []}')["rows"] if row["state"]]

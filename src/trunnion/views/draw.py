@@ -314,6 +314,11 @@ def _line(mark: Line, axes: Axes, spec: Chart, label: str | None) -> None:
         axes.errorbar(x, y, [mark.low, mark.high], label=label, capsize=3, elinewidth=1.1,
                       fmt="none" if not mark.look.mark else "", **style)  # fmt: skip
         return
+    if mark.arrow:
+        arrow = {"arrowstyle": "-|>", "color": style["color"], "linewidth": mark.look.width, "shrinkA": 0, "shrinkB": 0,
+                 "mutation_scale": 9}  # fmt: skip
+        axes.annotate("", xy=(x[-1], y[-1]), xytext=(x[0], y[0]), arrowprops=arrow, zorder=mark.look.order)
+        return
     if mark.shares is not None:
         pieces = np.stack([np.stack([x[:-1], y[:-1]], 1), np.stack([x[1:], y[1:]], 1)], 1)
         paints = RISING((mark.shares[:-1] + mark.shares[1:]) / 2)
@@ -346,10 +351,6 @@ def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
             if text:
                 axes.text(middle, 0.5, plain(text), transform=axes.get_xaxis_transform(), rotation=90, ha="center",
                           va="center", fontsize=8, color=MUTED, zorder=3, clip_on=True)  # fmt: skip
-        case charts.Arrow(begin, tip):
-            arrow = {"arrowstyle": "-|>", "color": _colour(mark.look.colour), "linewidth": mark.look.width,
-                     "shrinkA": 0, "shrinkB": 0, "mutation_scale": 9}  # fmt: skip
-            axes.annotate("", xy=tip, xytext=begin, arrowprops=arrow, zorder=mark.look.order)
         case charts.Ring((x0, y0), r):
             paint = _colour(mark.look.colour)
             shape: dict[str, Any] = {

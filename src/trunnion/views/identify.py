@@ -14,8 +14,9 @@ from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
 from trunnion.views.axis import names
-from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, check_kind
+from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, Plot
 from trunnion.views.compare import about_data, data_section, of_model, shortened
+from trunnion.views.curves import check_kind
 from trunnion.views.page import NONE, Section, Table, counts, page
 from trunnion.views.sweep import thinned
 

@@ -14,8 +14,9 @@ from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.views.axis import Abscissa, Array, abscissa, members, names, peak
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Ring, Rule, check_kind, nth
+from trunnion.views.axis import Abscissa, Array, abscissa, members, names
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Ring, Rule
+from trunnion.views.curves import check_kind, nth, peak
 
 if TYPE_CHECKING:
     import xarray as xr

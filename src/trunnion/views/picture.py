@@ -15,8 +15,9 @@ from matplotlib.patheffects import Normal, Stroke
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
-from trunnion.views.axis import Array, ease, members, usual_peak
+from trunnion.views.axis import Array, members
 from trunnion.views.bodies import HALF, Scenery, Solid, Space, scenery, space
+from trunnion.views.curves import ease, usual_peak
 from trunnion.views.draw import INK, MUTED, PALETTE, Labels, new
 from trunnion.views.sketch import PALE_LINK, bare, closes, facts, short
 

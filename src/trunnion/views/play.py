@@ -12,8 +12,9 @@ from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.views.axis import abscissa, ease, names, usual_peak
-from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Panel, Plot, Rule, outside, silent
+from trunnion.views.axis import abscissa, names
+from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Panel, Plot, Rule
+from trunnion.views.curves import ease, outside, silent, usual_peak
 from trunnion.views.page import NONE, Section, Table, counts, page
 
 if TYPE_CHECKING:

@@ -18,26 +18,15 @@ from trunnion.results.dataset import units_along
 from trunnion.results.scales import without_noise
 from trunnion.solve.system import System
 from trunnion.views.as_built import built, losses
-from trunnion.views.axis import (
-    Array,
-    abscissa,
-    column,
-    ease,
-    intervals,
-    is_spatial,
-    larger_end,
-    layout,
-    members,
-    names,
-    numbers,
-    series,
-)  # fmt: skip
+from trunnion.views.axis import abscissa, column, intervals, larger_end, layout, members, names, numbers, series
 from trunnion.views.bodies import Space, best, gathered, looking, scenery
+from trunnion.views.curves import ease
 from trunnion.views.cycle import varying
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Row = NDArray[np.float64]
 FORMAT = 1
 SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
         "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
@@ -60,7 +49,8 @@ def scene(
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     picked = np.arange(0, count, -(-count // max(max_positions, 1)) or 1) if picked is None else picked
-    over, facts, spatial = abscissa(result), layout(result), is_spatial(result)
+    over, facts = abscissa(result), layout(result)
+    spatial = facts.get("space") == "spatial"
     rows, free = result.isel(position=picked), None if ideal is None else ideal.isel(position=picked)
     tracks = {} if spatial else members(rows, "point_position", "point")  # there the poses tell them
     points = {name: dict(zip("xy", map(series, track), strict=True)) for name, track in tracks.items()}
@@ -83,9 +73,9 @@ def scene(
         "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
                  for run in intervals(result)],
         "points": points,
-        "links": _links(rows, points),
+        "links": _links(rows, points, spatial),
         "joints": _joints(rows, free),
-        "loads": _loads(rows, points),
+        "loads": [] if spatial else _loads(rows, points),
         "springs": [{"name": name, "ends": list(ends), "pull": series(pulls.get(name))}
                     for name, spring in facts["springs"].items()
                     if (ends := spring.get("between")) and set(ends) <= points.keys()],
@@ -108,13 +98,13 @@ def scene(
     return drawn
 
 
-def _links(result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
+def _links(result: xr.Dataset, points: dict[str, Any], spatial: bool) -> list[dict[str, Any]]:
     """Links with the keys of their points, their angle, and which of their points are no joints."""
     facts, angles, rows = layout(result), members(result, "link_angle", "link"), []
     for name, link in facts["links"].items():
         keys = [f"{name}.{point}" for point in link["points"] if f"{name}.{point}" in points]
         free = [key for key in keys if key[len(name) + 1 :] not in facts["joints"]]
-        angle = series(angles[name]) if name in angles and not is_spatial(result) else [0.0]
+        angle = series(angles[name]) if name in angles and not spatial else [0.0]
         rows.append({"name": name, "ground": name == facts["ground"], "points": keys, "free": free, "angle": angle})
     return rows
 
@@ -153,7 +143,7 @@ def _loads(result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
     acts: the sign in which a load that resists a joint acts on its second link; 0 where it does not.
     """
     facts, rows = layout(result), list[dict[str, Any]]()
-    for name, load in facts["loads"].items() if not is_spatial(result) else ():
+    for name, load in facts["loads"].items():
         at, joint, acts = f"{load.get('link')}.{load.get('at')}", str(load.get("joint")), list[float | None]()
         noun = "joint_slide" if facts["joints"].get(joint, {}).get("type") in GUIDED else "joint_rotation"
         speed = column(result, f"{noun}_velocity", joint=joint) if joint in names(result, "joint") else None
@@ -273,7 +263,7 @@ def _screw(result: xr.Dataset, bodies: Space, link: str) -> dict[str, Any] | Non
     }
 
 
-def screw_axis(spin: Array, place: Array, velocity: Array, near: Array) -> tuple[Array, Array, Array]:
+def screw_axis(spin: Row, place: Row, velocity: Row, near: Row) -> tuple[Row, Row, Row]:
     """Screw axis of a body that turns with ω while its point p moves with v: c = p + ω × v/|ω|², h = ω · v/|ω|².
 
     All (3, position); near (3,): the point of the axis that is given is the one nearest to this. NaN where it does not

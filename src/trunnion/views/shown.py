@@ -21,7 +21,7 @@ from trunnion.results.figure import MORE_THAN
 from trunnion.results.quantities import readable
 from trunnion.results.tables import kind_of
 from trunnion.views.charts import Plot
-from trunnion.views.charts import check_kind as one_of
+from trunnion.views.curves import check_kind as one_of
 from trunnion.views.page import with_code
 
 if TYPE_CHECKING:

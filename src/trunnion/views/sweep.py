@@ -26,21 +26,9 @@ from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.studies.sweep import FIGURES
-from trunnion.views.axis import Array, ease_of_status, usual_peak
-from trunnion.views.charts import (
-    Axis,
-    Chart,
-    ColourScale,
-    Contours,
-    Line,
-    Look,
-    Mark,
-    Panel,
-    Plot,
-    Stripe,
-    check_kind,
-    outside,
-)  # fmt: skip
+from trunnion.views.axis import Array
+from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Panel, Plot, Stripe
+from trunnion.views.curves import check_kind, ease_of_status, outside, usual_peak
 from trunnion.views.page import Section, Table, counts, page
 
 if TYPE_CHECKING:

@@ -14,22 +14,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.views.axis import names
-from trunnion.views.charts import (
-    Axis,
-    Band,
-    Bars,
-    Chart,
-    Legend,
-    Line,
-    Look,
-    Mark,
-    Note,
-    Panel,
-    Plot,
-    Rule,
-    check_kind,
-    silent,
-)  # fmt: skip
+from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule
+from trunnion.views.curves import check_kind, silent
 from trunnion.views.page import Section, Table, counts, page
 from trunnion.views.readings import OUTER, MeasureReading, readings, share, share_interval, share_parts, value_text
 

@@ -20,7 +20,7 @@ from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.figure import Figure as Figure
 from trunnion.results.save import frame, save
 from trunnion.results.tables import KINDS, kind_of
-from trunnion.views.shown import animation_of, figure_of, report_of, result_html
+from trunnion.views.shown import figure_of, report_of, result_html
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,7 +91,9 @@ class Accessor:
         ideal: the same run without friction, drawn beside; height: of the frame in a notebook, px. Raises
         MechanismError of a result of another kind.
         """
-        return animation_of(self._result, ideal, height)
+        from trunnion.views.report import animation
+
+        return animation(self._result, ideal, height)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the figures that one looks at first, and the findings."""

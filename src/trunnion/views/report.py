@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.locking_course import HEAD
+from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.results.attributes import attribute
+from trunnion.results.attributes import whole as check_whole
 from trunnion.results.quantities import number, prefixed, quantity
 from trunnion.results.tables import kind_of
 from trunnion.views.as_built import error_rows, loss_rows
@@ -277,9 +279,13 @@ def animation(result: xr.Dataset, ideal: xr.Dataset | None = None, height: int =
     """The mechanism of a cycle moving through its positions, with reactions, player and figures of the position.
 
     ideal: the same run without friction, whose reactions are drawn beside; height: of the frame, px. Raises ValueError
-    if `ideal` has other positions.
+    if `ideal` has other positions, MechanismError of a result of another kind.
     """
     from markupsafe import Markup
+
+    if kind_of(result) != "cycle":
+        raise MechanismError(Finding(f"there is no animation of a {kind_of(result)}", "kind", "analyse a cycle"))
+    check_whole(result, "an animation")
 
     drawn = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from importlib import import_module
 from inspect import signature
@@ -26,8 +26,6 @@ from trunnion.views.page import with_code
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from trunnion.views.report import Animation
 
 # kind of result: the modules in which its `figure` and its `report` stand; loaded when they are asked for
 VIEWS = {
@@ -65,40 +63,25 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) 
 
 def report_of(result: xr.Dataset, **options: Any) -> str:
     """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
-    view = _view(result, "report")
-    return str(_called(view.report, f"report() of a {kind_of(result)}", result, options))
+    made = view(result, "report").report
+    check_keywords(f"report() of a {kind_of(result)}", options, [*signature(made).parameters][1:])
+    return str(made(result, **options))
 
 
 def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
-    view = _view(result, "figure")
-    if kind is not None and "kind" not in signature(view.figure).parameters:
+    made = view(result, "figure").figure
+    _, *parameters = signature(made).parameters
+    if kind is not None and "kind" not in parameters:
         what, remedy = f"a result of {kind_of(result)} has one figure", "leave the kind out"
         raise MechanismError(Finding(what, "kind", remedy))
-    given = options if kind is None else {"kind": kind, **options}
-    made = _called(view.figure, f"plot() of a {kind_of(result)}", result, given)
-    return drawn(result, made) if isinstance(made, Plot) else made  # a drawing of the mechanism
+    check_keywords(f"plot() of a {kind_of(result)}", options, parameters)
+    drawn = made(result, **(options if kind is None else {"kind": kind, **options}))
+    if not isinstance(drawn, Plot):  # a drawing of the mechanism
+        return drawn  # type: ignore[no-any-return]
+    from trunnion.views.draw import figure  # with matplotlib, which is slow to import
 
-
-def drawn(result: xr.Dataset, made: Plot) -> Figure:
-    """A plot drawn by matplotlib, which is slow to import."""
-    from trunnion.views.draw import figure
-
-    return figure(result, made)
-
-
-def _called(view: Callable[..., Any], call: str, result: xr.Dataset, options: Mapping[str, Any]) -> Any:
-    """What the function of a view makes of a result; TypeError for an option that it does not have."""
-    _, *parameters = signature(view).parameters
-    check_keywords(call, options, parameters)
-    return view(result, **options)
-
-
-def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:
-    """The moving mechanism of a cycle."""
-    if kind_of(result) != "cycle":
-        raise MechanismError(Finding(f"there is no animation of a {kind_of(result)}", "kind", "analyse a cycle"))
-    return _view(result, "report").animation(result, ideal, height)  # type: ignore[no-any-return]
+    return figure(result, drawn)
 
 
 def check_kind(of: str, kind: str) -> None:
@@ -106,8 +89,8 @@ def check_kind(of: str, kind: str) -> None:
     one_of(kind, import_module(f"trunnion.views.{VIEWS[of][0]}").KINDS)
 
 
-def _view(result: xr.Dataset, what: str) -> Any:
-    """The module of the view of a whole result."""
+def view(result: xr.Dataset, what: str) -> Any:
+    """The module in which the figure or the report of a whole result stands."""
     whole(result, f"a {what}")
     if kind_of(result) not in VIEWS:
         remedy = f"there are {what}s of {', '.join(VIEWS)}"
@@ -164,9 +147,7 @@ def mechanism_html(mechanism: Mechanism) -> str:
 def result_html(result: xr.Dataset) -> str:
     """Name, kind and size of a result, the figures that one looks at first, and its findings."""
     telling = ("position", "measure", "parameter", "condition", "channel")  # of how large a study is
-    sizes = [
-        f"{result.sizes[dim]} {agreeing(result.sizes[dim], dim, dim + 's')}" for dim in telling if dim in result.sizes
-    ]
+    sizes = [f"{count} {agreeing(count, dim, dim + 's')}" for dim in telling if (count := result.sizes.get(dim))]
     facts = [escape(", ".join([kind_of(result), *sizes]))]
     if formula := result.attrs.get("formula"):
         facts.append(f"<code>{escape(str(formula))}</code>")
@@ -180,7 +161,8 @@ def result_html(result: xr.Dataset) -> str:
             cells.append(f"<b>{escape(text)}</b>" + (f" {escape(part.remark)}" if part.remark else ""))
         head = f'<th style="{CELL}" scope="row">{escape(subject)}</th>'
         rows.append(f'<tr>{head}<td style="{CELL}">{"; ".join(cells)}</td></tr>')
-    table = f"<table>{''.join(rows)}</table>{_more(len(figures) - MOST_FIGURES, 'figures')}" if rows else ""
+    more = f"<p>… and {len(figures) - MOST_FIGURES} more figures</p>" if len(figures) > MOST_FIGURES else ""
+    table = f"<table>{''.join(rows)}</table>{more}" if rows else ""
     return _html(str(result.attrs.get("name") or "Result"), facts, table, findings_of(result))
 
 
@@ -191,14 +173,11 @@ def _html(name: str, facts: Sequence[str], body: str, findings: Sequence[Finding
         where = f"<code>{escape(finding.where)}</code> " if finding.where else ""
         where = f"{finding.kind_of_part} " if finding.kind_of_part else where
         remedy = f" — {with_code(finding.remedy)}" if finding.remedy else ""
-        severity = str(finding.severity)
-        head = f'<b style="color:{COLOURS.get(severity, "inherit")}">{escape(severity)}</b>'
-        rows.append(f"<li>{head} {where}{with_code(finding.what)}{remedy}</li>")
+        colour = COLOURS.get(str(finding.severity), "inherit")
+        rows.append(
+            f'<li><b style="color:{colour}">{finding.severity}</b> {where}{with_code(finding.what)}{remedy}</li>'
+        )
     listed = f'<ul style="margin:4px 0 0;padding-left:1.2em">{"".join(rows)}</ul>' if rows else ""
-    lines = "".join(f"<div>{fact}</div>" for fact in facts)
-    more = _more(len(findings) - MOST_FINDINGS, "findings")
-    return f'<div class="trunnion"><div style="font-weight:600">{escape(name)}</div>{lines}{body}{listed}{more}</div>'
-
-
-def _more(count: int, what: str) -> str:
-    return f"<p>… and {count} more {what}</p>" if count > 0 else ""
+    lines, more = "".join(f"<div>{fact}</div>" for fact in facts), len(findings) - MOST_FINDINGS
+    listed += f"<p>… and {more} more findings</p>" if more > 0 else ""
+    return f'<div class="trunnion"><div style="font-weight:600">{escape(name)}</div>{lines}{body}{listed}</div>'

@@ -45,7 +45,6 @@ def test_a_gap_is_none_with_its_cause():
     assert shown["drivers"][0]["effort"][132] is None
     assert shown["points"]["coupler.E"]["x"][200] is None
     assert shown["states"][str(int(Status.NOT_ASSEMBLED))] == Status.NOT_ASSEMBLED.text
-    assert shown["gaps"] == [{"from": "132°", "to": "228°", "text": Status.NOT_ASSEMBLED.text}]
 
 
 def test_many_positions_are_thinned_evenly_and_said():

@@ -225,7 +225,6 @@ def motion_scene(motion: Shown) -> dict[str, Any]:
     return drawn | {
         "status": [int(code) for code in status],
         "states": drawn["states"] | {str(code): text for code, text in STATES.items()},
-        "gaps": [],
         "sums": {name: values for name, values in drawn["sums"].items() if name != "efficiency_instant"},
         "ease": [1.0],  # no peak is cut: a motion in time has no dead centre that forces it
         "motion": of_motion,

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 Row = NDArray[np.float64]
 FORMAT = 1
-SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
-        "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
+SUMS = ("useful_power", "efficiency_instant")
 DRIVEN = ("efficiency_instant",)  # of a steady cycle it says nothing: the flywheel does the work at each position
 STILL = 1e-9  # of the largest speed: a joint that is slower rests
 UNTURNED = 1e-6  # a link that turns slower than this share of its fastest has no screw axis worth a line
@@ -70,8 +69,6 @@ def scene(
         "status": [int(code) for code in rows["status"].values],
         "ease": series(ease(result)[picked]),
         "states": {str(run.status): run.text for run in intervals(rows, 0)},
-        "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
-                 for run in intervals(result)],
         "points": points,
         "links": _links(rows, points, spatial),
         "joints": _joints(rows, free),

@@ -29,7 +29,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.views import charts
 from trunnion.views.axis import Abscissa, Array
-from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Legend, Line, Look, Mark, Note, Plot, Rule
+from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Note, Plot, Rule
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -164,7 +164,14 @@ def _shared(sheet: Figure, plot: Plot, columns: int) -> None:
 
 def _chart(axes: Axes, spec: Chart, labels: Labels, wide: float = 1.0) -> None:
     """A chart on axes; wide: of the width of all figures, which its legend has room in."""
-    dress(axes, spec.x.title, spec.y.title)
+    axes.set_axisbelow(True)  # quiet: a light grid below the curves, a frame left and below only
+    axes.grid(True, color=RULE, linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set(color=MUTED, linewidth=0.8)
+    axes.tick_params(colors=MUTED, labelcolor=INK, labelsize=8.5, width=0.8, length=3.5)
+    axes.tick_params(which="minor", length=2, width=0.6, color=MUTED)
+    axes.set_xlabel(plain(spec.x.title), fontsize=9, color=INK)
+    axes.set_ylabel(plain(spec.y.title), fontsize=9, color=INK)
     if isinstance(spec.x, Abscissa):
         _along(axes, spec.x)
     else:
@@ -193,20 +200,15 @@ def _chart(axes: Axes, spec: Chart, labels: Labels, wide: float = 1.0) -> None:
         axes.grid(visible=False, axis="y")
     axes.set_title(plain(spec.title), fontsize=8.5, color=INK, loc="left")
     axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
-    if spec.legend is not None:
-        _legend(axes, spec.legend, wide)
-
-
-def dress(axes: Axes, x: str = "", y: str = "") -> None:
-    """Quiet axes: a light grid below the curves, a frame left and below only, labels with units."""
-    axes.set_axisbelow(True)
-    axes.grid(True, color=RULE, linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set(color=MUTED, linewidth=0.8)
-    axes.tick_params(colors=MUTED, labelcolor=INK, labelsize=8.5, width=0.8, length=3.5)
-    axes.tick_params(which="minor", length=2, width=0.6, color=MUTED)
-    axes.set_xlabel(plain(x), fontsize=9, color=INK)
-    axes.set_ylabel(plain(y), fontsize=9, color=INK)
+    handles, texts = axes.get_legend_handles_labels()
+    if spec.legend is not None and len(handles) >= spec.legend.least:  # in rows above the axes, where it hides no curve
+        room, longest = int(wide * spec.legend.room), max(map(len, texts))
+        fits = sum(map(len, texts)) + 7 * len(texts) <= room  # with the line samples
+        axes.legend(
+            handles, texts, loc="lower left", bbox_to_anchor=(-0.02, 1.0), frameon=False, fontsize=8.5, labelcolor=INK,
+            ncols=len(texts) if fits else max(1, (room + 10) // (longest + 7)), handlelength=2.2, columnspacing=1.6,
+            borderaxespad=0.3,
+        )  # fmt: skip
 
 
 def _along(axes: Axes, over: Abscissa) -> None:
@@ -252,20 +254,6 @@ def _limits(axes: Axes, spec: Chart) -> None:
             low, high = axis.limits
             if low is not None or high is not None:
                 (axes.set_xlim if name == "x" else axes.set_ylim)(low, high)
-
-
-def _legend(axes: Axes, legend: Legend, wide: float) -> None:
-    """A legend in rows above the axes, where it hides no curve."""
-    handles, texts = axes.get_legend_handles_labels()
-    if len(handles) < legend.least:
-        return
-    room, longest = int(wide * legend.room), max(map(len, texts))
-    fits = sum(map(len, texts)) + 7 * len(texts) <= room  # with the line samples
-    columns = len(texts) if fits else max(1, (room + 10) // (longest + 7))
-    axes.legend(
-        handles, texts, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
-        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,
-    )  # fmt: skip
 
 
 # ---- marks --------------------------------------------------------------------------------------------------------

@@ -203,15 +203,6 @@ def sensors(result: xr.Dataset) -> list[Table]:
     return [Table("errors of the sensors", head, rows)] if rows else []
 
 
-def budget(result: xr.Dataset) -> list[Table]:
-    """Share of each source in the variance of each estimate; of sources that are anything."""
-    identified = [row for row in estimates(result) if row.identifiable]
-    sources = [name for name in names(result, "source") if any(row.shares[name] >= LEAST for row in identified)]
-    rows = [[name, *(_percent(row.shares[name]) for row in identified)] for name in sources]
-    head = ["share of the variance", *(row.short for row in identified)]
-    return [Table("uncertainty budget", head, rows)] if identified else []
-
-
 # ---- figures ------------------------------------------------------------------------------------------------------
 
 
@@ -294,7 +285,11 @@ def _residual_panels(result: xr.Dataset, channel: int, condition: int, first: bo
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML, to be filed."""
     rows = estimates(result)
-    after = [estimated(result).titled(""), *budget(result), *sensors(result)]
+    identified = [row for row in rows if row.identifiable]
+    sources = [name for name in names(result, "source") if any(row.shares[name] >= LEAST for row in identified)]
+    budget = Table("uncertainty budget", ["share of the variance", *(row.short for row in identified)],
+                   [[name, *(_percent(row.shares[name]) for row in identified)] for name in sources])  # fmt: skip
+    after = [estimated(result).titled(""), *([budget] if identified else []), *sensors(result)]
     parts = [Section("Estimates", pictures=[("Estimates", figure(result, "intervals"))], after=after)]
     parts += [Section("Correlation", after=[table]) for table in correlations(result)]
     about = "Measured minus model over the cycle, before and after the fit."

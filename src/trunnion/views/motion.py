@@ -116,7 +116,7 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Plot:
     in_play = "contact" in result.dims
     check_contacts(kind, in_play)
     if kind == "orbit":
-        panels = [Panel("", [_hole(result, k)], SIDE) for k in _pins(result)]
+        panels = [Panel("", [_hole(result, k)], SIDE) for k in pins(result)]
         if not panels:
             what = "no pin of this motion is in play"
             raise MechanismError(Finding(what, "--kind orbit", "use --kind gaps for guides"))
@@ -124,7 +124,15 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Plot:
     motion = shown(result)
     over = abscissa(motion.rows)
     if kind == "phase":
-        return Plot("Speed over coordinate", [Panel("", [_phase(motion.rows)], 3.75)])
+        drivers, marks = drivers_of(result), list[Mark]()
+        units = ("rad", "rad/s") if drivers[0][2] == "N m" else ("m", "m/s")
+        for k, (i, name, _) in enumerate(drivers):
+            q, rate = motion.rows["drive_coordinate"].values[i], motion.rows["drive_rate"].values[i]
+            first = np.flatnonzero(np.isfinite(q))[:1]
+            marks.append(Line(q, rate, name, nth(k)))
+            marks.append(Line(q[first], rate[first], None if k else "start", Look(k, dash="none", mark="o", size=6.0)))
+        chart = Chart(Axis(f"coordinate [{units[0]}]"), Axis(f"speed [{units[1]}]"), marks)
+        return Plot("Speed over coordinate", [Panel("", [chart], 3.75)])
     if kind != "sheet":
         title, build = OVER_TIME[kind]
         return Plot(title, [Panel("", [_with_events(build(motion.rows, over), motion)], 3.75)])
@@ -140,12 +148,6 @@ def check_contacts(kind: str, in_play: bool) -> None:
     if kind in OF_CONTACTS and not in_play:
         remedy = "state a contact of a joint with play, such as contact: {restitution: 0.8, modulus: 210 GPa}"
         raise MechanismError(Finding("no joint of this motion is in play", f"--kind {kind}", remedy))
-
-
-def orbits(result: xr.Dataset) -> list[tuple[str, Plot]]:
-    """What a report has beside the courses, with what it shows: the ways of pins in their holes."""
-    about = "The ways of the pins in their holes, with the forces on the walls"
-    return [(about, figure(result, "orbit"))] if "contact" in result.dims and _pins(result) else []
 
 
 def _curves(over: Abscissa, title: str, unit: str, rows: dict[str, Array]) -> Chart:
@@ -184,18 +186,6 @@ OVER_TIME: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
 KINDS = ("sheet", *OVER_TIME, "phase", "orbit")
 
 
-def _phase(result: xr.Dataset) -> Chart:
-    """Speed over coordinate of every driver, from its start."""
-    drivers, marks = drivers_of(result), list[Mark]()
-    units = ("rad", "rad/s") if drivers[0][2] == "N m" else ("m", "m/s")
-    for k, (i, name, _) in enumerate(drivers):
-        q, rate = result["drive_coordinate"].values[i], result["drive_rate"].values[i]
-        first = np.flatnonzero(np.isfinite(q))[:1]
-        marks.append(Line(q, rate, name, nth(k)))
-        marks.append(Line(q[first], rate[first], None if k else "start", Look(k, dash="none", mark="o", size=6.0)))
-    return Chart(Axis(f"coordinate [{units[0]}]"), Axis(f"speed [{units[1]}]"), marks)
-
-
 def _with_events(chart: Chart, motion: Shown) -> Chart:
     """The chart with thin lines where something happens; what, stands in the legend."""
     events = [event for event in motion.events if event.word not in OF_IMPACTS]  # the curves show these
@@ -211,7 +201,7 @@ def _with_events(chart: Chart, motion: Shown) -> Chart:
     return replace(chart, marks=marks, legend=Legend(1))
 
 
-def _pins(result: xr.Dataset) -> list[int]:
+def pins(result: xr.Dataset) -> list[int]:
     """The contacts that are pins in holes: of a guide there are four to a joint."""
     joints = set(attribute(result, "contact_pins"))
     return [k for k, contact in enumerate(names(result, "contact")) if contact in joints]

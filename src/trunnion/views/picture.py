@@ -95,12 +95,18 @@ def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = ()) ->
         paint = np.array(to_rgb(_colour(bodies, solid.paint, only)))
         for grown in (OUTLINE * bodies.size, 0.0):
             corners = camera.seen(facets(solid, bodies.size, grown) @ matrix.T + origin)
-            normals = normal_of(corners)
+            normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)  # 0 where two corners fall together
+            normals /= np.where(lengths > 0, lengths, 1.0)
             seen = (normals[:, 2] > 0) == (grown == 0.0)
             faces.append(corners[seen][..., :2])
             depths.append(corners[seen][..., 2].mean(axis=1))
-            lit = _lit(paint, normals[seen])
-            colours.append(lit if grown == 0.0 else np.broadcast_to(to_rgb(INK), lit.shape))
+            if grown:
+                colours.append(np.broadcast_to(to_rgb(INK), (int(seen.sum()), 3)))
+                continue
+            bright = np.clip(normals[seen] @ LIGHT, 0.0, 1.0)[:, None]  # lighter towards the light, darker away from it
+            lit = paint * (0.62 + 0.38 * bright)
+            colours.append(lit + (1 - lit) * 0.38 * np.maximum(0.0, bright - 0.55) / 0.45)
     polygons, edges = [*np.concatenate(faces)], [*np.concatenate(colours)]
     depth, widths, fills = [*np.concatenate(depths)], [0.35] * len(edges), [(*edge, 1.0) for edge in edges]
     for pieces, colour, width in strokes:  # lines among the bodies, a little nearer than they are
@@ -281,17 +287,3 @@ def _rod(points: Array, radius: float, grown: float, step: float) -> Array:
     shares = np.linspace(1.0, 0.0, 1 + max(1, int(radius // step)))[:, None, None]
     ends = [place + shares * (ring - place) for place, ring in zip(line[[0, -1]], (rings[0], rings[-1]), strict=True)]
     return np.concatenate([_between(np.array(rings)), _between(ends[0][::-1]), _between(ends[1])])
-
-
-def normal_of(corners: Array) -> Array:
-    """Unit normals of facets (…, corner, 3), also where two corners fall together."""
-    across = np.cross(corners[..., 2, :] - corners[..., 0, :], corners[..., 3, :] - corners[..., 1, :])
-    size = np.linalg.norm(across, axis=-1, keepdims=True)
-    return np.asarray(across / np.where(size > 0, size, 1.0), dtype=float)
-
-
-def _lit(colour: Array, normals: Array) -> Array:
-    """The colour of each facet under the light: lighter towards it, darker away from it."""
-    bright = np.clip(normals @ LIGHT, 0.0, 1.0)[:, None]
-    lit = colour * (0.62 + 0.38 * bright)
-    return np.asarray(lit + (1 - lit) * 0.38 * np.maximum(0.0, bright - 0.55) / 0.45, dtype=float)

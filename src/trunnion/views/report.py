@@ -27,7 +27,7 @@ from trunnion.results.quantities import number, prefixed, quantity
 from trunnion.results.tables import kind_of
 from trunnion.views.as_built import error_rows, loss_rows
 from trunnion.views.axis import Abscissa, abscissa, column, intervals, members, names, series
-from trunnion.views.motion import OF_IMPACTS, Shown, drivers_of, energies, orbits, shown
+from trunnion.views.motion import OF_IMPACTS, Shown, drivers_of, energies, figure, pins, shown
 from trunnion.views.page import NONE, bundle, hashed, headline, inputs_of, said, source, template, web_text
 from trunnion.views.scene import scene
 
@@ -63,17 +63,33 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
     if ideal is not None:
         raise TypeError("report() of a motion has no argument 'ideal'")
     motion = shown(result)
-    events = motion.events[:MOST_EVENTS]
+    events, rows, residual = motion.events[:MOST_EVENTS], motion.rows, motion.rows["energy_residual"].values
+    account: dict[str, list[tuple[str, str]]] = {"works": [], "held": []}  # what came in and went out, what is left
+    turned, quality = 0.0, list[dict[str, str]]()
+    for name, text, course in energies(rows):
+        title = f"change of the {text}" if name in HELD else text
+        value = quantity(float(course[-1]) * (-1 if name in LOST else 1), "J")
+        account["held" if name in HELD else "works"].append((title[:1].upper() + title[1:], value))
+        turned = max(turned, float(np.nanmax(np.abs(course))))
+    if turned > 0:
+        account["rest"] = [("Difference", quantity(float(residual[-1]), "J"))]
+        worst = int(np.abs(np.nan_to_num(residual)).argmax())
+        quality.append({"label": "Energy account", "value": quantity(abs(float(residual[worst])) / turned, "1"),
+                        "place": _stated(float(rows["time"].values[worst])), "meaning": ENERGY})  # fmt: skip
+    pictures = []
+    if "contact" in result.dims and pins(result):
+        alt = "The ways of the pins in their holes, with the forces on the walls"
+        pictures.append({"alt": alt, "source": source(result, figure(result, "orbit"))})
     about = {
         "length": _stated(motion.end),
         "asked": _stated(motion.asked) if motion.early else "",
         "events": [{"seconds": f"{event.time:.9g}", "time": quantity(event.time, "s"), "cells": event[1:]}
                    for event in events],
         "more": len(motion.events) - len(events),
-        "account": _account(motion.rows),
-        "pictures": [{"alt": title, "source": source(result, plot)} for title, plot in orbits(result)],
+        "account": account if turned > 0 else {},
+        "pictures": pictures,
     }  # fmt: skip
-    return _page(motion.rows, motion_scene(motion), about, _energy_error(motion.rows))
+    return _page(rows, motion_scene(motion), about, quality)
 
 
 def _page(
@@ -84,7 +100,11 @@ def _page(
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style, script = web_text("report.css"), bundle("report.js")
-    runs, thinned = intervals(result), ""
+    runs, thinned, holding = intervals(result), "", attribute(result, "locking_ranges", "{}")
+    if holding:  # the ranges of the states of locking as a table and a strip
+        rows = holding["rows"]
+        holding |= {"head": HEAD, "centred": "seat_offset" in result, "strip": [row for row in rows if row["state"]],
+                    "more": max(0, len(rows) - MOST_RANGES), "rows": rows[:MOST_RANGES]}  # fmt: skip
     if drawn["thinned"] is not None:  # "3rd" if every third position is shown
         stride = -(-drawn["thinned"] // drawn["count"])
         thinned = f"{stride}{'th' if 10 <= stride % 100 <= 20 else {1: 'st', 2: 'nd', 3: 'rd'}.get(stride % 10, 'th')}"
@@ -94,7 +114,7 @@ def _page(
         "positions": result.sizes["position"], "thinned": thinned,
         "drawn": drawn["count"], "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs), "summary": headline(result),
-        "holding": _holding(result), "errors": error_rows(result), "losses": loss_rows(result),
+        "holding": holding, "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(drawn["built"] and drawn["built"]["seats"]),
         "balance": [*quality, *_balance(result)], "inputs": inputs_of(result),
         **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
@@ -109,16 +129,6 @@ def embedded(data: Any) -> str:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text
-
-
-def _holding(result: xr.Dataset) -> dict[str, Any] | None:
-    """The ranges of the states of locking as a table and a strip; None where the result has none."""
-    ranges = attribute(result, "locking_ranges", "{}")
-    if not ranges:
-        return None
-    rows = ranges["rows"]
-    return {**ranges, "head": HEAD, "centred": "seat_offset" in result, "strip": [row for row in rows if row["state"]],
-            "more": max(0, len(rows) - MOST_RANGES), "rows": rows[:MOST_RANGES]}  # fmt: skip
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
@@ -170,30 +180,6 @@ def _stated(seconds: float) -> str:
     """A time as one would state it, without zeros that promise precision: "3 s"."""
     factor, unit = prefixed(seconds, "s")
     return f"{seconds * factor:.4g}\u00a0{unit}"
-
-
-def _account(rows: xr.Dataset) -> dict[str, list[tuple[str, str]]]:
-    """What came in and went out until the end, and what is left; empty where nothing moves."""
-    account: dict[str, list[tuple[str, str]]] = {"works": [], "held": []}
-    for name, text, course in energies(rows):
-        title = f"change of the {text}" if name in HELD else text
-        value = quantity(float(course[-1]) * (-1 if name in LOST else 1), "J")
-        account["held" if name in HELD else "works"].append((title[:1].upper() + title[1:], value))
-    if not any(account.values()):
-        return {}
-    return account | {"rest": [("Difference", quantity(float(rows["energy_residual"].values[-1]), "J"))]}
-
-
-def _energy_error(rows: xr.Dataset) -> list[dict[str, Any]]:
-    """The largest error of the energy account as a row of the numerical quality."""
-    sizes = np.abs(np.nan_to_num(rows["energy_residual"].values))
-    worst = int(sizes.argmax())
-    turned = max((float(np.nanmax(np.abs(course))) for *_, course in energies(rows)), default=0.0)
-    if not turned > 0:
-        return []
-    place = _stated(float(rows["time"].values[worst]))
-    value = quantity(float(sizes[worst] / turned), "1")
-    return [{"label": "Energy account", "value": value, "place": place, "meaning": ENERGY}]
 
 
 def motion_scene(motion: Shown) -> dict[str, Any]:

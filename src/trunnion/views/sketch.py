@@ -166,10 +166,16 @@ def sketch(axes: Axes, drawing: Picture, index: int) -> None:
         if PAIRS[joint["type"]].guided:
             _slider(axes, drawing, name, index, place, grounded)
             continue
-        if grounded:
-            _support(axes, place, BLOCK * drawing.size)
-        r = 0.0095 * drawing.size
-        axes.add_patch(Circle((place[0], place[1]), r, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6))
+        if grounded:  # a fixed bearing: a triangle on a hatched line
+            r = BLOCK * drawing.size
+            triangle = place + r * np.array([(0.0, 0.0), (-1.2, -2.0), (1.2, -2.0)])
+            axes.add_patch(Polygon(triangle, closed=True, facecolor="white", edgecolor=INK, linewidth=1.2,
+                                   joinstyle="round", zorder=3))  # fmt: skip
+            _hatched(axes, place + np.array([0, -2 * r]), np.array([1.0, 0.0]), 2.2 * r, r)
+        pin = Circle(
+            (place[0], place[1]), 0.0095 * drawing.size, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6
+        )
+        axes.add_patch(pin)
 
 
 def closes(track: Array) -> bool:
@@ -217,14 +223,6 @@ def _spring(axes: Axes, drawing: Picture, ends: Sequence[str], index: int, pull:
     path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
     line = ":" if pull is not None and pull[index] == 0 else "-"
     axes.plot(*path, color=MUTED, linewidth=1.1, linestyle=line, zorder=4.5, solid_joinstyle="round")
-
-
-def _support(axes: Axes, place: Array, r: float) -> None:
-    """A fixed bearing: a triangle on a hatched line."""
-    x, y = place
-    axes.add_patch(Polygon([(x, y), (x - 1.2 * r, y - 2 * r), (x + 1.2 * r, y - 2 * r)], closed=True,
-                           facecolor="white", edgecolor=INK, linewidth=1.2, joinstyle="round", zorder=3))  # fmt: skip
-    _hatched(axes, place + np.array([0, -2 * r]), np.array([1.0, 0.0]), 2.2 * r, r)
 
 
 def _hatched(axes: Axes, middle: Array, along: Array, half: float, r: float) -> None:

@@ -9,7 +9,6 @@ from typer.testing import CliRunner
 from trunnion import Mechanism, analyse
 from trunnion.cli.app import app
 from trunnion.errors import Status
-from trunnion.views.axis import _touched
 from trunnion.views.curves import ease, usual_peak, whole_peaks
 from trunnion.views.shown import figure_of
 
@@ -132,7 +131,12 @@ def test_plot_and_report_can_show_all(tmp_path):
         assert ("near a dead centre" in picture.read_text("utf-8")) != bool(switch)
 
 
-def test_a_run_goes_on_from_the_last_position_to_the_first():
-    within, core = np.array([1, 1, 0, 1, 0, 1], bool), np.array([0, 0, 0, 0, 0, 1], bool)
-    np.testing.assert_array_equal(_touched(within, core, True), np.array([1, 1, 0, 0, 0, 1], bool))
-    np.testing.assert_array_equal(_touched(within, core, False), np.array([0, 0, 0, 0, 0, 1], bool))
+@pytest.mark.parametrize(("periodic", "eased"), [(1, [0, 1, 11]), (0, [11])])
+def test_a_run_goes_on_from_the_last_position_to_the_first(periodic, eased):
+    condition, status = np.ones(12), np.zeros(12, int)
+    condition[[0, 1, 3, 11]], status[11] = 10.0, Status.NEAR_SINGULAR
+    drive = xr.Variable("position", 30.0 * np.arange(12), {"units": "°", "long_name": "angle of A"})
+    result = xr.Dataset(
+        {"condition": ("position", condition), "status": ("position", status)}, {"drive": drive}, {"periodic": periodic}
+    )
+    assert np.flatnonzero(ease(result) < 1).tolist() == eased

@@ -11,7 +11,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
-from trunnion.results.quantities import number, prefixed, quantity
+from trunnion.results.quantities import number, quantity
 from trunnion.results.scales import without_noise
 from trunnion.views.axis import Array, abscissa, column, is_spatial, layout, members, names, numbers
 from trunnion.views.bodies import Space, gathered
@@ -65,30 +65,20 @@ def worst_points(result: xr.Dataset) -> dict[str, Array]:
     return picked
 
 
-class Output(NamedTuple):
-    """The error of what a joint of the ground does that no driver moves: of its rotation, rad, or of its slide, m."""
+def outputs(result: xr.Dataset) -> dict[str, tuple[str, str, Array]]:
+    """Transmission errors, as the summary of the result has them: of the joints of the ground that no driver moves.
 
-    joint: str
-    unit: str
-    error: Array
-
-    @property
-    def label(self) -> str:
-        """What it is of, in words."""
-        return f"{'slide' if self.unit == 'm' else 'rotation'} of {self.joint}"
-
-
-def outputs(result: xr.Dataset) -> list[Output]:
-    """Transmission errors, as the summary of the result has them."""
-    facts, drivers, picked = layout(result), names(result, "driver"), []
+    By joint: what it is of ("rotation of D"), unit and error, of the rotation, rad, or of the slide, m.
+    """
+    facts, drivers, errors = layout(result), names(result, "driver"), {}
     for joint in names(result, "joint"):
         about = facts["joints"].get(joint, {})
         if facts["ground"] in about.get("links", ()) and joint not in drivers:
-            guided = PAIRS[about["type"]].guided
-            error = column(result, f"joint_{'slide' if guided else 'rotation'}_error", joint=joint)
+            noun, unit = ("slide", "m") if PAIRS[about["type"]].guided else ("rotation", "rad")
+            error = column(result, f"joint_{noun}_error", joint=joint)
             if error is not None and np.isfinite(error).any():
-                picked.append(Output(joint, "m" if guided else "rad", error))
-    return picked
+                errors[joint] = f"{noun} of {joint}", unit, error
+    return errors
 
 
 def losses(result: xr.Dataset) -> dict[str, NDArray[np.intp]]:
@@ -185,7 +175,9 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         return row(label, value, float(np.nanmax(other)) if np.isfinite(other).any() else np.nan, unit, place)
 
     rows += [largest(f"Position error of {key}, largest", "m", size) for key, size in worst_points(result).items()]
-    rows += [largest(f"Transmission error, {out.label}, largest", out.unit, out.error) for out in outputs(result)]
+    rows += [
+        largest(f"Transmission error, {text}, largest", unit, error) for text, unit, error in outputs(result).values()
+    ]
     efforts, changes = (members(result, f"drive_effort{end}", "driver") for end in ("", "_change"))
     for (driver, effort), unit in zip(efforts.items(), units_along(result["drive_effort"], "driver"), strict=True):
         noun = "force" if unit == "N" else "torque"
@@ -241,9 +233,9 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
         "worst": [{"label": key, "values": _series(values)} for key, values in worst_points(result).items()],
         "outputs": [
-            {"label": output.label, "unit": unit, "values": _series(output.error * factor)}
-            for output in outputs(result)
-            for factor, unit in [prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")]
+            {"label": text, "unit": "°" if unit == "rad" else "m",
+             "values": _series(np.degrees(error) if unit == "rad" else error)}
+            for text, unit, error in outputs(result).values()
         ],
         "lost": lost,
         "seats": [

@@ -139,7 +139,12 @@ def ease(result: xr.Dataset) -> Array:
     grown = np.fmax(condition / float(np.median(finite)) if finite.size else 1.0, friction)
     grown = np.where(np.isfinite(grown), grown, 1.0)
     unbounded, core = np.isin(status, UNBOUNDED), np.isin(status, BESIDE) | (friction > CLOSE)
-    near = _touched((grown > GROWN) | unbounded, core, abscissa(result).closed) & ~unbounded
+    within = (grown > GROWN) | unbounded
+    # runs of positions within, each from one that is not: after the last of a closed turn comes the first
+    first = int(np.argmin(within)) if abscissa(result).closed else 0
+    runs = np.cumsum(np.diff(np.roll(within, -first), prepend=0) != 0)
+    touched = np.isin(runs, np.unique(runs[np.roll(core & within, -first)]))
+    near = np.roll(touched, first) & within & ~unbounded
     return np.where(near, GROWN / grown, 1.0)
 
 
@@ -151,18 +156,6 @@ def ease_of_status(result: xr.Dataset, status: NDArray[np.generic]) -> Array:
 def whole_peaks(result: xr.Dataset, uncut: bool = True) -> xr.Dataset:
     """The result whose views cut no peak, if that is wanted."""
     return result.assign_attrs({UNCUT: 1}) if uncut else result
-
-
-def _touched(within: NDArray[np.bool_], core: NDArray[np.bool_], closed: bool) -> NDArray[np.bool_]:
-    """The runs of `within` that hold one of `core`; closed: after the last comes the first."""
-    if within.all():
-        return within & core.any()
-    first = int(np.flatnonzero(~within)[0]) if closed else 0
-    inside, at, marks = np.roll(within, -first), np.roll(core, -first), np.zeros_like(within)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        marks[start:stop] = at[start:stop].any()
-    return np.roll(marks, first)
 
 
 def peak(*columns: Array | None) -> float:

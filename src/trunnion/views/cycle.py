@@ -285,7 +285,7 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         over_drive(result, "position error", "m", worst_points(result), scale=scale, marks=lost, legend=Legend(1))
     ]
     for unit, noun in (("rad", "rotation"), ("m", "slide")):
-        if errors := {output.joint: output.error for output in outputs(result) if output.unit == unit}:
+        if errors := {joint: error for joint, (_, unit_of, error) in outputs(result).items() if unit_of == unit}:
             title = f"transmission error,\n{noun}"
             charts.append(over_drive(result, title, unit, errors, marks=lost, legend=Legend(1)))
     return _stack("Errors of the mechanism as built", charts)

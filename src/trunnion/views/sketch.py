@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Circle, Polygon, Rectangle
@@ -246,9 +246,9 @@ def _slider(axes: Axes, drawing: Picture, name: str, index: int, place: Array, g
         middle = place + ((low + high) / 2 - float(along @ place)) * along
         _hatched(axes, middle + np.array([along[1], -along[0]]) * r, along, (high - low) / 2 + 2.4 * r, r)
     elif (barrel_and_rod := cylinder(drawing, name)) is not None:
-        start, end = (drawing.tracks[key][:, index] for key in barrel_and_rod[:2])
+        eyes, barrel, rod = barrel_and_rod
+        start, end = (drawing.tracks[key][:, index] for key in eyes)
         way = (end - start) / np.hypot(*(end - start))
-        rod, barrel = barrel_and_rod.long
         _plate(axes, np.array([end - rod * way, end]), drawing.colour(second), 7.0 * drawing.weight,
                2.4 * drawing.weight, 4.2)  # fmt: skip
         _plate(axes, np.array([start, start + barrel * way]), drawing.colour(first), 17.0 * drawing.weight,
@@ -267,20 +267,12 @@ def _slider(axes: Axes, drawing: Picture, name: str, index: int, place: Array, g
                              linewidth=1.3, zorder=5))  # fmt: skip
 
 
-class Cylinder(NamedTuple):
-    """A driven slide between two links that are pinned at their other ends: a barrel and the piston rod in it.
+def cylinder(drawing: Picture, name: str) -> tuple[list[str], float, float] | None:
+    """The cylinder that a driven slide between two links pinned at their other ends is: keys of the eyes of barrel and
+    piston rod, and the lengths of barrel and rod, m.
 
-    barrel, rod: their eyes, as keys of points; long: length of the rod and of the barrel, m.
-    """
-
-    barrel: str
-    rod: str
-    long: tuple[float, float]
-
-
-def cylinder(drawing: Picture, name: str) -> Cylinder | None:
-    """The cylinder that a slide is; None where no driver moves it, where its links have more than two joints, where the
-    eyes do not lie on the guide, or where the stroke is longer than a barrel could be.
+    None where no driver moves it, where its links have more than two joints, where the eyes do not lie on the guide, or
+    where the stroke is longer than a barrel could be.
     """
     stated, eyes = drawing.stated, list[str]()
     for link in stated["joints"][name]["links"]:
@@ -295,7 +287,7 @@ def cylinder(drawing: Picture, name: str) -> Cylinder | None:
     low, high = (float(end(np.hypot(*apart))) for end in (np.nanmin, np.nanmax))
     rod = PISTON * low
     barrel = high - rod + (1 - PISTON) * low
-    return Cylinder(eyes[0], eyes[1], (rod, barrel)) if barrel < low and width < ASIDE * drawing.size else None
+    return (eyes, barrel, rod) if barrel < low and width < ASIDE * drawing.size else None
 
 
 def name_points(axes: Axes, drawing: Picture, index: int, labels: Labels, only: Sequence[str] | None = None) -> None:

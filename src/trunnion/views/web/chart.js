@@ -12,10 +12,11 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
  * A chart of `series` [{label, values, kind, quiet, unlisted}] in one unit; `kind` is a class that colours the curve, `quiet`
  * has no dot, `unlisted` no line in the legend; a value that reaches `most` is more than that.
  * `breaks` of a series are positions that no line leads to, `marks` positions that are marked in all of the chart.
- * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
+ * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `free` ends it at the
+ * data instead of zero; `note` is a remark below it.
  * `pick(index, firm)` is called when the reader points.
  */
-export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
+export function lineChart(scene, { title, unit, series, band = null, limits = null, free = false, note = "", marks = [], pick }) {
   const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
   const scope = limits ? peak(limits) : usualPeak(scene, ...columns);
   const scale = prefixed(scope, unit, scene.units);
@@ -44,6 +45,7 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
     band,
     marks,
     limits: cut ? [-scope, scope] : limits,
+    free,
     title,
     frame: null,
     index: 0,
@@ -181,7 +183,7 @@ function centre({ x, y, width, height }) {
  * stay far from zero, as an efficiency about 0.8, fill the height instead.
  */
 function vertical(chart) {
-  const { scale, series, band, limits } = chart;
+  const { scale, series, band, limits, free } = chart;
   const shown = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
   let [low, high] = extent(shown) ?? [0, 0];
   if (limits) [low, high] = [Math.max(low, limits[0]), Math.min(high, limits[1])];
@@ -190,10 +192,11 @@ function vertical(chart) {
     const half = Math.max(0.6 * (high - low), 0.01 * high);
     return [middle - half, Math.min(middle + half, limits[1])];
   }
-  [low, high] = [Math.min(low, 0) * scale.factor, Math.max(high, 0) * scale.factor];
+  if (!free || !(high > low)) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+  [low, high] = [low * scale.factor, high * scale.factor];
   if (!(high - low > 0)) return limits ? [0, 100] : [low - 1, high + 1];
   const room = 0.05 * (high - low);
-  return [low < 0 ? low - room : 0, high > 0 ? high + room : 0];
+  return [low === 0 ? 0 : low - room, high === 0 ? 0 : high + room];
 }
 
 function describe(chart) {

@@ -141,7 +141,7 @@ function joined(series) {
 function slideChart({ joints, drivers, count }, kinds) {
   const sliding = joints.filter(({ name, slide }) => slide?.length && name !== drivers[0]?.name);
   const series = sliding.map(({ name, slide }) => ({ label: name, values: full(slide, count), kind: kinds.get(name) }));
-  return series.length ? [{ title: "Slide of joints", unit: "m", series }] : [];
+  return series.length ? [{ title: "Slide of joints", unit: "m", series, free: true }] : [];
 }
 
 function momentChart(scene, kinds) {

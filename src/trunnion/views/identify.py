@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,16 +38,20 @@ BEFORE, AFTER = 4, 0
 class Estimate:
     """One unknown as it is read: in degrees, mm or SI.
 
-    limit: −1 or 1 where it is on its lower or upper limit; identifiable: whether the data tell it; shares: of each
-    source in its variance; lacking: why there is no estimate.
+    short: its name without the section that all numbers of joints have; tail: the unit behind a number; half: expanded
+    uncertainty, NaN where the data do not tell it; places: decimals that this leaves; limit: −1 or 1 where it is on its
+    lower or upper limit; shares: of each source in its variance; lacking: why there is no estimate.
     """
 
     name: str
+    short: str
     paths: tuple[str, ...]
     unit: str
+    tail: str
     start: float
     value: float
-    deviation: float
+    half: float
+    places: int
     lower: float
     upper: float
     freedom: float
@@ -56,26 +59,6 @@ class Estimate:
     identifiable: bool
     shares: dict[str, float]
     lacking: str = "not identifiable"
-
-    @cached_property
-    def half(self) -> float:
-        """Expanded uncertainty, half of the two-sided interval."""
-        return float(quantile(self.freedom)) * self.deviation if self.identifiable else math.nan
-
-    @cached_property
-    def places(self) -> int:
-        """Decimals that its uncertainty leaves."""
-        return max(decimals(self.half), 0) if self.identifiable else 4
-
-    @property
-    def short(self) -> str:
-        """Its name without the section that all numbers of joints have."""
-        return self.name.removeprefix("joints.").removeprefix("dimensions.")
-
-    @property
-    def tail(self) -> str:
-        """The unit behind a number."""
-        return self.unit if self.unit in ("", "°") else f"\u00a0{self.unit}"
 
     @property
     def start_text(self) -> str:
@@ -115,15 +98,21 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
     gross = bool(errors & {"fit.misfit", "sensor.off"})  # then an interval means nothing, however narrow
     lacking = "model does not fit" if gross else "not identifiable"
     for p, name in enumerate(names(result, "parameter")):
-        factor, display_unit = read_in(units[p])
+        factor, unit = read_in(units[p])
         keys = ("start", "estimate", "standard_uncertainty", "lower", "upper")
         start, value, deviation, lower, upper = (float(result[key].values[p]) * factor for key in keys)
+        freedom, identifiable = (
+            float(result["degrees_of_freedom"].values[p]),
+            bool(result["told"].values[p]) and not gross,
+        )
+        half = float(quantile(freedom)) * deviation if identifiable else math.nan
         shares = dict(zip(names(result, "source"), map(float, result["share"].values[p]), strict=True))
-        rows.append(
-            Estimate(name, tuple(paths[p]), display_unit, start, value, deviation, lower, upper,
-                     float(result["degrees_of_freedom"].values[p]), int(result["limit"].values[p]),
-                     bool(result["told"].values[p]) and not gross, shares, lacking)
-        )  # fmt: skip
+        rows.append(Estimate(
+            name, name.removeprefix("joints.").removeprefix("dimensions."), tuple(paths[p]), unit,
+            unit if unit in ("", "°") else f"\u00a0{unit}", start, value, half,
+            max(decimals(half), 0) if identifiable else 4, lower, upper, freedom, int(result["limit"].values[p]),
+            identifiable, shares, lacking,
+        ))  # fmt: skip
     return rows
 
 
@@ -132,7 +121,13 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
 
 def tables(result: xr.Dataset) -> list[Table]:
     """The estimates, how they go together, how the model fits, and what was held out."""
-    return [estimated(result), *correlations(result), *fits(result), *held_out(result), *sensors(result)]
+    return [
+        estimated(result),
+        *correlations(result),
+        *residuals(result, True),
+        *residuals(result, False),
+        *sensors(result),
+    ]
 
 
 def estimated(result: xr.Dataset) -> Table:
@@ -154,20 +149,16 @@ def correlations(result: xr.Dataset) -> list[Table]:
     return [Table("correlation", head, rows)] if len(rows) > 1 else []
 
 
-def fits(result: xr.Dataset) -> list[Table]:
-    """A row for each channel and condition: RMS before and after, and what the scatter explains of it."""
-    return _residuals(result, "residuals of the fit", "turns", ("rms_before", "rms_after", "rms_expected"))
+def residuals(result: xr.Dataset, fitted: bool) -> list[Table]:
+    """A row for each channel and condition: RMS before and after, and what the scatter explains of it.
 
-
-def held_out(result: xr.Dataset) -> list[Table]:
-    """What was not fitted but predicted."""
-    keys = ("held_out_before", "held_out_after", "held_out_expected")
-    return _residuals(result, "held-out data", "held_out_turns", keys)
-
-
-def _residuals(result: xr.Dataset, title: str, turns_of: str, keys: tuple[str, ...]) -> list[Table]:
-    """RMS before and after, the expected one, and the data that they are of."""
-    rows, (head, short), fitted = [], shortened(names(result, "condition")), turns_of == "turns"
+    fitted: of what was fitted, else of what was held out and predicted.
+    """
+    rows, (head, short), stem = [], shortened(names(result, "condition")), "rms" if fitted else "held_out"
+    turns_of, keys = (
+        "turns" if fitted else "held_out_turns",
+        [f"{stem}_{key}" for key in ("before", "after", "expected")],
+    )
     for i, (name, unit) in enumerate(zip(names(result, "channel"), attribute(result, "channel_units"), strict=True)):
         turns = result[turns_of].values[i]
         conditions = np.flatnonzero(turns > 0)
@@ -178,7 +169,7 @@ def _residuals(result: xr.Dataset, title: str, turns_of: str, keys: tuple[str, .
             positions = [f"{int(result['used'].values[i, k]):,}"] if fitted else []
             rows.append([name, short[k], *cells, display_unit, f"{int(turns[k])}", *positions])
     columns = ["channel", head, "RMS before", "RMS after", "expected", "unit", "turns", *(["positions"] * fitted)]
-    return [Table(title, columns, rows)] if rows else []
+    return [Table("residuals of the fit" if fitted else "held-out data", columns, rows)] if rows else []
 
 
 def sensors(result: xr.Dataset) -> list[Table]:
@@ -294,9 +285,9 @@ def report(result: xr.Dataset) -> str:
     parts += [Section("Correlation", after=[table]) for table in correlations(result)]
     about = "Measured minus model over the cycle, before and after the fit."
     pictures = [("Residuals", figure(result, "residuals"))] if courses(result) else []
-    parts.append(Section("Residuals", about, pictures, after=fits(result)))
+    parts.append(Section("Residuals", about, pictures, after=residuals(result, True)))
     about = "Data not used in the fit, and the error of their prediction."
-    parts += [Section("Held out", about, after=[table]) for table in held_out(result)]
+    parts += [Section("Held out", about, after=[table]) for table in residuals(result, False)]
     paths = [[row.name, ", ".join(row.paths), row.start_text] for row in rows]
     end = [
         data_section(result, "data_files"),

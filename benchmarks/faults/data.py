@@ -248,8 +248,8 @@ _VIEWS = (
     ),
     Fault(
         "runs-are-not-closed",
-        "views/axis.py",
-        "first = int(np.flatnonzero(~within)[0]) if closed else 0",
+        "views/curves.py",
+        "first = int(np.argmin(within)) if abscissa(result).closed else 0",
         "first = 0",
         ("tests/views/test_peaks.py",),
     ),

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, choices, put
 from trunnion.solve.run import prepare
 from trunnion.views import picture, sketch
 from trunnion.views.assembly import some
-from trunnion.views.bodies import Camera, best, looking, scenery, space
+from trunnion.views.bodies import Camera, Scenery, best, looking, scenery, space
 from trunnion.views.draw import INK, MUTED, RULE, Labels, new, plain
 
 if TYPE_CHECKING:
@@ -24,17 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_DRAWN = 24  # ways of one group
+MOST_DRAWN = 24  # ways of one group in the plane, half of them in space
 SYMBOLS = 1.25  # size of joints and bearings, as if the mechanism were so much larger
 STEPS = 90  # positions of the paths
-
-
-class Cell(NamedTuple):
-    """One drawing: the way that it is of, the box around what it shows, m, and what draws it into axes."""
-
-    way: AssemblyMode
-    box: tuple[float, float, float, float] | None
-    draw: Callable[[Axes, float, Labels], None]
+Cell = tuple[AssemblyMode, sketch.Picture | Scenery | None, int]  # a way, its drawing if it has one, and the position
 
 
 def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Figure:
@@ -48,30 +41,26 @@ def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Fi
     if not groups:
         what = "no group has more than one assembly mode: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
-    spatial, cameras, rows = mechanism.space == "spatial", list[Camera](), []
-    result = analyse(mechanism.with_friction("off"), 1)
+    spatial, camera, rows = mechanism.space == "spatial", None, list[list[Cell]]()
     for choice in groups:
-        rows.append(list[Cell]())
+        rows.append([])
         for mode in some(choice, MOST_DRAWN // 2 if spatial else MOST_DRAWN):
             try:
-                found = _run(mechanism, choice, mode)
-                rows[-1].append(_in_space(found, choice, mode, cameras) if spatial else _in_plane(found, choice, mode))
+                drawing, index = _drawing(_run(mechanism, choice, mode), choice, camera)
             except MechanismError:
-                rows[-1].append(Cell(mode, None, lambda axes, *_: _remark(axes, "cannot be assembled in this mode")))
+                rows[-1].append((mode, None, 0))
+                continue
+            camera = drawing.camera if isinstance(drawing, Scenery) else None  # of the first, from which all are seen
+            rows[-1].append((mode, drawing, index))
     columns, width = (3, 2.9) if spatial else (4, 2.4)
-    return _sheet(result, groups, rows, min(columns, max(map(len, rows))), width)
-
-
-def _sheet(
-    result: xr.Dataset, groups: Sequence[GroupModes], rows: list[list[Cell]], columns: int, width: float
-) -> Figure:
-    """The drawings in rows of at most so many columns, each so wide, inches, all in one scale."""
-    boxes = np.array([cell.box for row in rows for cell in row if cell.box] or [(0.0, 0.0, 1.0, 1.0)])
+    columns = min(columns, max(map(len, rows)))
+    boxes = np.array([cell[1].box for row in rows for cell in row if cell[1]] or [(0.0, 0.0, 1.0, 1.0)])
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
     low, high = low - np.array([0.08, 0.11]) * size, high + 0.08 * size  # a bearing reaches below its joint
     across, up = high - low
     heights = [0.3 + math.ceil(len(row) / columns) * (width * min(max(up / across, 0.45), 1.6) + 0.28) for row in rows]
+    result = analyse(mechanism.with_friction("off"), 1)
     figure = new("Assembly modes", result, 0.6 + sum(heights), max(columns, 2) * width + 0.2)
     strips = figure.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
     labels = Labels(figure)
@@ -84,13 +73,8 @@ def _sheet(
         for axes in grid[len(row) :]:
             axes.set_visible(False)
         for axes, cell in zip(grid, row, strict=False):
-            axes.set_aspect("equal")
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[])
-            used = cell.way.taken  # its frame is bold
-            axes.spines[:].set(color=INK if used else RULE, linewidth=1.8 if used else 1.0)
-            title = plain(f"{choice.link}: {cell.way.name}" + "  used" * used)
-            axes.set_title(title, fontsize=8.5, fontweight="bold" if used else "normal", color=INK, loc="left", pad=4)
-            cell.draw(axes, float(np.hypot(across, up)), labels)
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[], aspect="equal")
+            _draw(axes, choice, cell, SYMBOLS * float(np.hypot(across, up)), labels)
     labels.place()
     return figure
 
@@ -106,35 +90,34 @@ def _run(mechanism: Mechanism, choice: GroupModes, mode: AssemblyMode) -> xr.Dat
         return analyse(Mechanism(**{**data, "assembly": {key: data["assembly"][key] for key in hints}}), STEPS)
 
 
-def _remark(axes: Axes, text: str) -> None:
-    axes.text(0.03, 0.03, plain(text), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
+def _drawing(result: xr.Dataset, choice: GroupModes, camera: Camera | None) -> tuple[sketch.Picture | Scenery, int]:
+    """What draws a result, in space from a camera or the best side, and the position at which its group is chosen."""
+    usable = np.arange(result.sizes["position"])
+    if "link_rotation" in result:
+        bodies = space(result)
+        drawing: sketch.Picture | Scenery = scenery(bodies, camera or looking(*best(bodies)))
+        usable = np.flatnonzero(bodies.drawable)
+    else:
+        drawing = replace(sketch.picture(result), weight=0.5, only=choice.links)
+    return drawing, int(usable[np.argmin(np.abs(result["time"].values[usable] - choice.time))])
 
 
-def _in_plane(result: xr.Dataset, choice: GroupModes, mode: AssemblyMode) -> Cell:
-    """The whole mechanism, as far as it is assembled, with the names of the joints of the group."""
-    drawing = replace(sketch.picture(result), weight=0.5, only=choice.links)
-    index = int(np.argmin(np.abs(result["time"].values - choice.time)))
-    missing = [link for link in drawing.moving if not np.isfinite(drawing.angles.get(link, np.zeros(index + 1))[index])]
-
-    def draw(axes: Axes, size: float, labels: Labels) -> None:
-        symbols = replace(drawing, size=SYMBOLS * size)
+def _draw(axes: Axes, choice: GroupModes, cell: Cell, size: float, labels: Labels) -> None:
+    """The whole mechanism, as far as it is assembled, with the names of the joints of the group; size: of symbols."""
+    mode, drawing, index = cell
+    used, remark = mode.taken, ""  # the frame of the one that is taken is bold
+    axes.spines[:].set(color=INK if used else RULE, linewidth=1.8 if used else 1.0)
+    title = plain(f"{choice.link}: {mode.name}" + "  used" * used)
+    axes.set_title(title, fontsize=8.5, fontweight="bold" if used else "normal", color=INK, loc="left", pad=4)
+    if drawing is None:
+        remark = "cannot be assembled in this mode"
+    elif isinstance(drawing, Scenery):
+        picture.sketch(axes, drawing, index, choice.links)
+        picture.name_joints(axes, drawing, index, labels, tuple(mode.joints), 7.5)
+    else:
+        symbols, none = replace(drawing, size=size), np.zeros(index + 1)
         sketch.sketch(axes, symbols, index)
         sketch.name_points(axes, symbols, index, labels, list(mode.joints))
-        if missing:
-            _remark(axes, f"not assembled here: {', '.join(missing)}")
-
-    return Cell(mode, drawing.box, draw)
-
-
-def _in_space(result: xr.Dataset, choice: GroupModes, mode: AssemblyMode, cameras: list[Camera]) -> Cell:
-    """The same in space; cameras: that of the first drawing, from which all are seen."""
-    bodies = space(result)
-    cameras[:] = cameras or [looking(*best(bodies))]
-    look, places = scenery(bodies, cameras[0]), np.flatnonzero(bodies.drawable)
-    index = int(places[np.argmin(np.abs(result["time"].values[places] - choice.time))])
-
-    def draw(axes: Axes, size: float, labels: Labels) -> None:
-        picture.sketch(axes, look, index, choice.links)
-        picture.name_joints(axes, look, index, labels, tuple(mode.joints), 7.5)
-
-    return Cell(mode, look.box, draw)
+        missing = [link for link in drawing.moving if not np.isfinite(drawing.angles.get(link, none)[index])]
+        remark = f"not assembled here: {', '.join(missing)}" if missing else ""
+    axes.text(0.03, 0.03, plain(remark), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)

@@ -42,7 +42,7 @@ def compiled(function: Callable[..., Sequence[Any]], *arrays: Array, width: int 
     found = [np.empty((1, count), bool if graph.booleans[node] else float) for node in nodes]
     code = machine_code.MachineCode(program(graph, nodes, width or machine_code.vector_width()))
     inputs = {f"x{k}": np.ascontiguousarray(array, float) for k, array in enumerate(arrays)}
-    code.run(inputs, found, (0, 1), (0, count))
+    code.bound(inputs, found, (0, 1), (0, count))()
     return [one[0] for one in found]
 
 
@@ -158,10 +158,10 @@ def test_numbers_given_by_sample_by_position_and_by_both(width: int) -> None:
     code = machine_code.MachineCode(program(graph, nodes, width))
     inputs = {"g": np.array([0.3]), "s": rng.normal(size=5), "p": rng.uniform(size=11), "b": rng.normal(size=(5, 11))}
     whole, parts = ([np.empty((5, 11), bool if graph.booleans[n] else float) for n in nodes] for _ in range(2))
-    code.run(inputs, whole, (0, 5), (0, 11))
+    code.bound(inputs, whole, (0, 5), (0, 11))()
     for samples in ((0, 2), (2, 5)):
         for positions in ((0, 4), (4, 11)):
-            code.run(inputs, parts, samples, positions)
+            code.bound(inputs, parts, samples, positions)()
     values = (inputs["g"], inputs["s"][:, None], inputs["p"], inputs["b"])
     g_, s_, p_, b_ = values
     expected = [np.sin(g_) + s_ * np.cos(p_) - b_, np.exp(p_) * g_, s_ * g_, (p_ > 0.5) & (b_ < s_), g_ * 2.0]
@@ -218,7 +218,7 @@ def run_once() -> Any:
     x = Recorded(graph, graph.input("x", POSITION))
     code = machine_code.MachineCode(program(graph, [(x * 3.0).node], 4))
     found = [np.empty((1, 8))]
-    code.run({"x": np.arange(8.0)}, found, (0, 1), (0, 8))
+    code.bound({"x": np.arange(8.0)}, found, (0, 1), (0, 8))()
     assert np.array_equal(found[0][0], 3.0 * np.arange(8))
     return code
 
@@ -261,7 +261,7 @@ def test_a_loop_goes_on_while_any_lane_changes() -> None:
     (count,) = looped(lambda now: [np.minimum(now[0] + 1.0, x)], [0.0 * x], 50)
     code = machine_code.MachineCode(program(graph, [number_of(graph, count)], 4))
     found, rounds = np.empty((1, 8)), np.array([0.0, 3.0, 49.0, 7.0, 2.0, 60.0, 1.0, 0.0])
-    code.run({"x": rounds}, [found], (0, 1), (0, 8))
+    code.bound({"x": rounds}, [found], (0, 1), (0, 8))()
     assert found[0].tolist() == np.minimum(rounds, 50.0).tolist()
 
 

@@ -16,7 +16,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero, plus
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["cross", "determinant", "dot", "inverse", "solve", "solve_and_determinant", "weighted"]
+__all__ = ["cross", "dot", "inverse", "solve", "weighted"]
 
 Vector = tuple[Number, Number]
 Table = NDArray[np.float64]
@@ -43,22 +43,12 @@ def weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
     return total
 
 
-def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[list[Number]]:
+def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> tuple[list[list[Number]], Number]:
     """Solutions x of A x = b for each right-hand side b in `sides`, by elimination with row pivoting per lane.
 
-    matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side.
-    A singular lane comes out non-finite (a zero pivot divides).
+    matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side, and det A.
+    A singular lane comes out non-finite (a zero pivot divides), its determinant NaN or 0.
     """
-    return _solve(matrix, sides)[0]
-
-
-def solve_and_determinant(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) -> tuple[list[Number], Number]:
-    """`solve` for one side, and `determinant`, from one elimination."""
-    (solution,), determinant_ = _solve(matrix, (side,))
-    return solution, determinant_
-
-
-def _solve(matrix: Sequence[Sequence[Number]], sides: Sequence[Sequence[Number]]) -> tuple[list[list[Number]], Number]:
     n = len(matrix)
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
@@ -113,7 +103,7 @@ def _table(rows: Sequence[Sequence[Number]]) -> Table | None:
 
 
 def _solve_table(table: Table) -> tuple[list[list[Number]], Number]:
-    """`_solve` of a table, the sides in its last columns."""
+    """`solve` of a table, the sides in its last columns."""
     n = len(table)
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -168,14 +158,8 @@ def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number
     return sign
 
 
-def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """A⁻¹ as rows, by elimination with row pivoting per lane; non-finite where a lane is singular."""
+def inverse(matrix: Sequence[Sequence[Number]]) -> tuple[list[list[Number]], Number]:
+    """A⁻¹ as rows, and det A, by elimination with row pivoting per lane; non-finite where a lane is singular."""
     n = len(matrix)
-    sides = ([1.0 if i == j else 0.0 for i in range(n)] for j in range(n))
-    columns = solve(matrix, *sides)
-    return [[columns[j][i] for j in range(n)] for i in range(n)]
-
-
-def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
-    """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
-    return _solve(matrix, ())[1]
+    columns, determinant = solve(matrix, *([1.0 if i == j else 0.0 for i in range(n)] for j in range(n)))
+    return [[columns[j][i] for j in range(n)] for i in range(n)], determinant

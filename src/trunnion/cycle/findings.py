@@ -213,7 +213,7 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
 def _past_dead_centre(cycle: Cycle, places: NDArray[np.intp]) -> str | None:
     """The driver that cannot move another joint to some positions; None where there is another cause."""
     system, time = cycle.run.system, cycle.at.time[places]
-    for name in system.inverse.moves if system.inverse else ():
+    for name in (name for name, driver in system.mechanism.drivers.items() if driver.moves):
         coordinate, rate, _ = system.drive(cycle.run.values, name, time)
         if np.all(np.isnan(coordinate) & np.isfinite(rate)):
             return name

@@ -92,20 +92,6 @@ class MachineCode:
         self.address = self._engine.get_function_address("kernel")
         self.function = ctypes.CFUNCTYPE(None, *kinds)(self.address)
 
-    def run(
-        self,
-        inputs: Mapping[str, Array],
-        outputs: Sequence[NDArray[Any]],
-        samples: tuple[int, int],
-        positions: tuple[int, int],
-    ) -> None:
-        """Fill the outputs, (sample, position), from the first to before the last sample and position.
-
-        inputs: by name, (1,), (sample,), (position,) or (sample, position), contiguous floats. There are at least as
-        many positions as a vector holds.
-        """
-        self.bound(inputs, outputs, samples, positions)()
-
     def bound(
         self,
         inputs: Mapping[str, Array],
@@ -113,7 +99,11 @@ class MachineCode:
         samples: tuple[int, int],
         positions: tuple[int, int],
     ) -> Callable[[], None]:
-        """`run` with these arrays, for being called often: what they hold may change in between."""
+        """What fills the outputs, (sample, position), from the first to before the last sample and position.
+
+        It may be called often: what the arrays hold may change in between. inputs: by name, (1,), (sample,),
+        (position,) or (sample, position), contiguous floats. There are at least as many positions as a vector holds.
+        """
         if positions[1] - positions[0] < self.width:  # it would write before the beginning of the row
             raise ValueError(f"{positions[1] - positions[0]} positions, where a vector holds {self.width}")
         stride = outputs[0].shape[-1]

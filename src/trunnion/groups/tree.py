@@ -321,17 +321,16 @@ class Tree(ABC):
         jacobian, gap = self.jacobian(placed, screws, size, drive), self.opening(placed, q, size)
         inverse: list[list[Number]] = []
         condition: Number = 1.0
-        orientation: Number = 1.0  # a closed form stays on its branch by itself
+        orientation: Number = 1.0
         if not jacobian or not self.free:  # held fast: either it closes as it is or not at all
             orientation = np.where(gap <= CLOSED * size, 1.0, np.nan)
             frames = each(frames, lambda n: n * orientation) if self.chords else frames
         elif self.redundant:
             inverse, condition = redundant.pseudo_inverse(jacobian), redundant.condition(jacobian)
         else:
-            inverse = linalg.inverse(jacobian)
+            inverse, determinant = linalg.inverse(jacobian)
             condition = frobenius(jacobian, inverse)
-            if not self.BRANCHES:
-                orientation = np.sign(primal(linalg.determinant(jacobian)))
+            orientation = 1.0 if self.BRANCHES else np.sign(primal(determinant))  # a closed form stays on its branch
         row = tuple(self._in_row(q))
         ratios = tuple(drive[len(self.driven) :: NUMBERS])
         return Pose(frames, placed, screws, row, jacobian, inverse, size, gap, condition, orientation, ratios)
@@ -402,7 +401,7 @@ class Tree(ABC):
         """Newton's step in every freedom, slides in units of the size; 0 for the driven."""
         _, placed, screws = self.place(elements, q)
         jacobian, gaps = self.jacobian(placed, screws, size, drive), self.gaps(placed, q, size, drive)
-        moves = redundant.least_squares(jacobian, gaps) if self.redundant else linalg.solve(jacobian, gaps)[0]
+        moves = redundant.least_squares(jacobian, gaps) if self.redundant else linalg.solve(jacobian, gaps)[0][0]
         steps = self.unmoved()
         for (k, i), move in zip(self.free, moves, strict=True):
             steps[k][i] = -move

@@ -95,14 +95,14 @@ def _correct(
     be larger than the first one, beyond such a kink; where that is off the branch, so is the end.
     """
     residual, jacobian = system(start, share)
-    move, determinant = linalg.solve_and_determinant(jacobian, residual)
+    (move,), determinant = linalg.solve(jacobian, residual)
     aim = [value - delta for value, delta in zip(start, move, strict=True)]
     calm = np.where(lanes & (determinant > 0), 1.0, 0.0)
 
     def correction(now: list[Number]) -> list[Number]:
         *x, determinant, closed, going = now
         residual, jacobian = system(x, share)
-        move, fresh = linalg.solve_and_determinant(jacobian, residual)
+        (move,), fresh = linalg.solve(jacobian, residual)
         # not by the last move, which rounding keeps from ending where the unknowns run to infinity
         done = largest(residual) <= CLOSED * largest(x) + TINY
         ahead = (going > 0) & ~done & (fresh > 0)

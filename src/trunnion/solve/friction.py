@@ -444,7 +444,7 @@ def _chosen(lanes: Number, row: Sequence[Number], others: Sequence[Number]) -> l
 
 def _corrected(forces: Sequence[Number], gaps: Sequence[Number], slopes: Sequence[Sequence[Number]]) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
-    (moves,) = linalg.solve(_identity_minus(slopes), gaps)
+    (moves,), _ = linalg.solve(_identity_minus(slopes), gaps)
     return [plus(force, move) for force, move in zip(forces, moves, strict=True)]
 
 

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,25 +114,16 @@ class Cycle:
         return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
 
 
-class Outputs(Protocol):
-    """What drivers do whose laws are of other joints, see `inverse.Inverse`."""
-
-    @property
-    def moves(self) -> Mapping[str, str]: ...
-    def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]: ...
-    def span(self, name: str, span: Span) -> Span: ...
-
-
 @dataclass(frozen=True)
 class System:
     """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`.
 
-    inverse: where a driver moves another joint by the law that it states.
+    inverse: an `inverse.Inverse`, where a driver moves another joint by the law that it states.
     """
 
     mechanism: Mechanism
     plan: Plan
-    inverse: Outputs | None = None
+    inverse: Any = None
 
     @cached_property
     def spatial(self) -> bool:
@@ -405,8 +396,8 @@ class System:
         if self.is_free(values, name):
             return tuple(values[f"{STATE}{name}.{key}"] for key in FREED)
         if self.mechanism.drivers[name].moves:
-            assert self.inverse
-            return self.inverse.drive(values, name, time)
+            moved: tuple[Number, Number, Number] = self.inverse.drive(values, name, time)
+            return moved
         law = self.mechanism.drivers[name].motion
         return law.function(time, self.motion_of(values, name))
 
@@ -556,7 +547,7 @@ def _widest(links: Sequence[Sequence[Sequence[Number]]]) -> Number:
     return widest
 
 
-def build(mechanism: Mechanism, inverse: Outputs | None = None) -> System:
+def build(mechanism: Mechanism, inverse: Any = None) -> System:
     """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
     findings = []
     for name, joint in mechanism.effective_joints.items() if mechanism.space == "spatial" else ():

@@ -137,6 +137,10 @@ class Part(BaseModel):
         foreign = {name for name in dir(BaseModel) if not name.startswith("_")} - type(self).model_fields.keys()
         return [name for name in super().__dir__() if name not in foreign]
 
+    def filled(self, values: Mapping[str, Any]) -> Self:
+        """With values for keys that it does not state."""
+        return self.model_copy(update={key: value for key, value in values.items() if getattr(self, key) is None})
+
     @model_validator(mode="after")
     def _freeze(self) -> Self:
         self.__dict__.update({key: _read_only(value) for key, value in vars(self).items() if isinstance(value, dict)})

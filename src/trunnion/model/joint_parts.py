@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import (
     ConfigDict,
@@ -166,12 +166,9 @@ class Contact(Part):
         """With the exponent 3/2 where bodies give, and Poisson's ratio 0.3 and the pin's material where not stated."""
         if self.of.rigid:
             return self
-        values: dict[str, Any] = {"exponent": self.exponent or Quantity(1.5, KINDS["number"])}
-        if self.modulus is not None:
-            values["poisson_ratio"] = self.poisson_ratio or Quantity(0.3, KINDS["number"])
-            values["hole_modulus"] = self.hole_modulus or self.modulus
-            values["hole_poisson_ratio"] = self.hole_poisson_ratio or values["poisson_ratio"]
-        return self.model_copy(update=values)
+        ratio = self.poisson_ratio or Quantity(0.3, KINDS["number"])
+        pin = {"poisson_ratio": ratio, "hole_modulus": self.modulus, "hole_poisson_ratio": ratio}
+        return self.filled({"exponent": Quantity(1.5, KINDS["number"]), **(pin if self.modulus else {})})
 
 
 class Seat(Part):
@@ -191,8 +188,7 @@ class Seat(Part):
         """With zeros for the angles that were not stated, unless a direction is."""
         if self.direction is not None and self.beta is None and self.xi is None:
             return self
-        zero = Quantity(0, KINDS["angle"])
-        return self.model_copy(update={"beta": self.beta or zero, "xi": self.xi or zero})
+        return self.filled(dict.fromkeys(("beta", "xi"), Quantity(0, KINDS["angle"])))
 
 
 SeatChoice = Annotated[
@@ -215,9 +211,8 @@ class Misalignment(Part):
 
     def complete(self, spatial: bool) -> Misalignment:
         """With zeros for what was not stated; in the plane nothing tilts. `offset_towards` stays as it is."""
-        zeros = {"tilt": "angle", "towards": "angle", "offset": "length"}
-        missing = [key for key in zeros if getattr(self, key) is None and (spatial or key != "tilt")]
-        return self.model_copy(update={key: Quantity(0, KINDS[zeros[key]]) for key in missing})
+        kinds = {"towards": "angle", "offset": "length"} | ({"tilt": "angle"} if spatial else {})
+        return self.filled({key: Quantity(0, KINDS[kind]) for key, kind in kinds.items()})
 
 
 class Friction(ShortForm):

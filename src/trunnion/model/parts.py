@@ -233,18 +233,10 @@ class Driver(Part):
 
     def complete(self) -> Driver:
         """With zeros for what its law takes and was not stated."""
-        missing = {key: zero for key, zero in _DRIVER_ZEROS.items() if key in self.motion.takes}
-        return self.model_copy(update={key: zero for key, zero in missing.items() if getattr(self, key) is None})
-
-
-_ANGLE_OR_LENGTH = KINDS["angle"] | KINDS["length"]
-_DRIVER_ZEROS = {
-    "start": Quantity(0, _ANGLE_OR_LENGTH),
-    "mean": Quantity(0, _ANGLE_OR_LENGTH),
-    "phase": Quantity(0, KINDS["angle"]),
-    "dwell": Quantity(0, KINDS["time"]),
-    "delay": Quantity(0, KINDS["time"]),
-}
+        coordinate = KINDS["angle"] | KINDS["length"]
+        kinds = {"start": coordinate, "mean": coordinate, "phase": KINDS["angle"], "dwell": KINDS["time"],
+                 "delay": KINDS["time"]}  # fmt: skip
+        return self.filled({key: Quantity(0, kind) for key, kind in kinds.items() if key in self.motion.takes})
 
 
 class Load(Part):
@@ -346,8 +338,7 @@ class Gear(Part):
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""
-        usual = USUAL_PRESSURE_ANGLE if self.teeth and self.lead is None else None
-        return self if self.pressure_angle else self.model_copy(update={"pressure_angle": usual})
+        return self.filled({"pressure_angle": USUAL_PRESSURE_ANGLE} if self.teeth and self.lead is None else {})
 
     @property
     def slides(self) -> bool:

@@ -62,8 +62,7 @@ def test_a_model_with_every_section_is_read_and_written_without_loss(text: str, 
     written_and_read(read_mechanism(tmp_path / "model.yaml"), tmp_path / f"copy.{extension}")
 
 
-def test_toml(tmp_path: Path, findings_of: FindingsOf) -> None:
-    text = """
+TOML = """
 trunnion = 1
 [links]
 ground = { points = { A = [0, 0] } }
@@ -73,21 +72,19 @@ A = { type = "revolute", links = ["ground", "crank"] }
 [drivers.A]
 speed = "10 rad/s"
 """
-    path = tmp_path / "good.toml"
-    path.write_text(text)
+
+
+def test_toml_and_json_with_tabs_and_their_lines(tmp_path: Path, findings_of: FindingsOf) -> None:
+    path, data = tmp_path / "good.toml", read_mechanism(DURANGO).data()
+    path.write_text(TOML)
     assert read_mechanism(path).parameters()["links.crank.points.B.x"] == 2.0
-    found = findings_of(text.replace("speed =", "sped ="), "model.toml")
+    found = findings_of(TOML.replace("speed =", "sped ="), "model.toml")
     assert {(one.where, one.line) for one in found} >= {("drivers.A.sped", None)}
     with pytest.raises(MechanismError, match=r"TOML is read but not written — write \.yaml or \.json"):
         read_mechanism(path).write(tmp_path / "other.toml")
-
-
-def test_json_with_tabs_and_lines(tmp_path: Path, findings_of: FindingsOf) -> None:
-    data = read_mechanism(DURANGO).data()
     text = json.dumps(data, indent="\t", ensure_ascii=True)
-    path = tmp_path / "model.json"
-    path.write_text(text)
-    assert read_mechanism(path).data() == data
+    (tmp_path / "model.json").write_text(text)
+    assert read_mechanism(tmp_path / "model.json").data() == data
     found = findings_of(text.replace('"mass"', '"mas"', 1), "model.json")
     assert found[0].line == 1 + text[: text.index('"mass"')].count("\n")
 

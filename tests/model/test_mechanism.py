@@ -8,7 +8,6 @@ import math
 import operator
 import pickle
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -137,14 +136,12 @@ def test_friction_merges_defaults_and_own_values() -> None:
     data["joints"]["B"]["friction"] = {"pair_factor": "4/3"}
     data["joints"]["C"]["friction"] = 0.1
     joints = Mechanism(**data).effective_joints
-    found = {name: {key: value.evaluate() for key, value in joints[name].friction.parameters.items()} for name in "ABC"}  # type: ignore[union-attr]
-    assert found == {
-        "A": {"pair_factor": 1.0, "coefficient": 0.4},
-        "B": {"pair_factor": 4 / 3, "coefficient": 0.4},
-        "C": {"pair_factor": 1.0, "coefficient": 0.1},
-    }
-    assert all(joints[name].friction.law == "coulomb" for name in "ABCD")  # type: ignore[union-attr]
-    assert all(joints[name].friction.model == "two-contact" for name in "ABCD")  # type: ignore[union-attr]
+    for name, factor, coefficient in (("A", 1.0, 0.4), ("B", 4 / 3, 0.4), ("C", 1.0, 0.1), ("D", 1.0, 0.4)):
+        friction = joints[name].friction
+        assert friction is not None
+        assert (friction.law, friction.model) == ("coulomb", "two-contact")
+        numbers = {key: value.evaluate() for key, value in friction.parameters.items()}
+        assert numbers == {"pair_factor": factor, "coefficient": coefficient}
 
 
 def test_building_from_classes_is_building_from_data() -> None:
@@ -264,19 +261,18 @@ def test_what_a_measure_gives(varied: Mechanism, kind: str, keys: dict[str, str]
     assert f"'1 kg' is a mass where {'an' if kind[0] == 'a' else 'a'} {kind} is needed" in finding.what
 
 
-def test_a_structure_has_no_position_to_choose() -> None:
-    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "one-way-clutch.yaml")
-    with pytest.raises(MechanismError, match="there is no driver whose coordinate it could be"):
-        with_measure(mechanism, angle="strut", at="10 deg")
-
-
-def test_in_space_an_angle_has_an_axis() -> None:
-    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "rssr.yaml")
-    assert with_measure(mechanism, reaction="B", axis="z").measures["one"].axis == "z"
-    with pytest.raises(MechanismError, match="a spherical joint has no rotation or slide about one axis"):
-        with_measure(mechanism, transmission_error="B")
-    with pytest.raises(MechanismError, match="add axis: x, y or z"):
-        with_measure(mechanism, angle="rocker")
+@pytest.mark.parametrize(
+    ("example", "keys", "what"),
+    [
+        ("one-way-clutch", {"angle": "strut", "at": "10 deg"}, "there is no driver whose coordinate it could be"),
+        ("rssr", {"transmission_error": "B"}, "a spherical joint has no rotation or slide about one axis"),
+        ("rssr", {"angle": "rocker"}, "add axis: x, y or z"),
+    ],
+)
+def test_a_measure_that_the_structure_does_not_have(example: str, keys: dict[str, str], what: str) -> None:
+    mechanism = Mechanism.read(next(path for path in EXAMPLES if path.stem == example))
+    with pytest.raises(MechanismError, match=what):
+        with_measure(mechanism, **keys)
 
 
 def test_place_and_window_of_a_measure_can_be_set(varied: Mechanism) -> None:

@@ -1,12 +1,12 @@
 """Checks of joints: their links, what each part of a joint needs, and where it has an effect.
 
-What a key of a joint takes to have an effect is a row of `USES`; what a part needs beside it is a row of `_lacks`.
+What a key of a joint takes to have an effect is a row of `_effects`; what a part needs beside it, of `_lacks`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -45,90 +45,63 @@ LARGE = 0.01  # of a side: a play above it is not small
 # ---- where a key has an effect --------------------------------------------------------------------------------
 
 
-class _Case(NamedTuple):
-    """A joint with its defaults, its pair, and whether it is in space."""
-
-    joint: Joint
-    pair: Pair
-    spatial: bool
-
-    @property
-    def law(self) -> str:
-        """Its friction law."""
-        return str(self.joint.friction and self.joint.friction.law)
-
-    @property
-    def touches(self) -> bool:
-        """Whether its contact is modelled where it is in play."""
-        return self.pair.bored if self.spatial else self.pair.planar and (self.pair.pivot or self.pair.guided)
-
-    @property
-    def by_length(self) -> bool:
-        """Whether the length of its pin counts: by the bearing moment, or with the radius by the pressure."""
-        return not self.pair.ball if self.spatial else self.joint.pin is not None and self.joint.pin.radius is not None
-
-    @property
-    def upright(self) -> bool:
-        """Whether its pin can lean in the hole, or does not."""
-        seat = self.joint.seat
-        leans = isinstance(seat, Seat) and seat.beta is not None and seat.beta.source != 0
-        return not self.pair.ball and (self.spatial or self.pair.guided or not leans)
+REMARKS = ("pin.length", "pin.bearing", "guide.height", "stiffness.radial", "stiffness.axial", "stiffness.tilting")
 
 
-_UNUSED = "has no use for it: it is not used"
-# by key: where it has an effect, and what is said of a joint where it has none
-USES: Mapping[str, tuple[Callable[[_Case], bool], str]] = {
-    "pin": (lambda case: case.pair.turns, "has no pin"),
-    "pin.offset": (lambda case: case.spatial and not case.pair.ball, "has no axis to offset its bearing along"),
-    "pin.end_float": (lambda case: case.spatial and case.pair.pivot, "has no play along an axis"),
-    "guide": (lambda case: case.pair.guided, "has no guide"),
-    "guide.width": (lambda case: case.spatial, "carries no torsion about its slide"),
-    "pitch": (lambda case: case.pair.threaded, "has no pitch"),
-    "losses": (lambda case: bool(case.pair.motions), "has no one axis for a loss to act about or along"),
-    "friction": (lambda case: case.pair.turns or case.pair.guided, "has no contact whose friction is modelled"),
-    "friction.model": (
-        lambda case: (
-            str(case.joint.friction and case.joint.friction.model) != "pezzuti" or (case.spatial and not case.pair.ball)
-        ),
-        "carries no bearing moment, which the model pezzuti is of",
-    ),
-    "friction.backward": (
-        lambda case: case.pair.count == 1 and case.joint.contact is None,
-        "has no one freedom, forward and backward, or is in play",
-    ),
-    "friction.law": (
-        lambda case: case.law != "rolling" or (case.pair.pivot and case.joint.contact is None),
-        "does not roll: of a slide on rollers state the coefficient arm over radius",
-    ),
-    "misalignment": (lambda case: case.pair.bored, "has no plain pin whose misalignment is modelled"),
-    "misalignment.tilt": (lambda case: case.spatial, "cannot tilt"),
-    "contact": (lambda case: case.touches, "has no contact in play that is modelled"),
-    "seat": (lambda case: case.joint.type in PLAY_PAIRS, "has no play that is modelled, and so no seat"),
-    "seat.beta": (lambda case: case.upright, "does not tilt, or has its seat stated by a direction"),
-    "seat.xi": (lambda case: not case.pair.ball, "has its seat stated by a direction"),
-    "seat.direction": (lambda case: case.pair.ball, "has its seat stated by angles, xi and beta"),
-    "seat_on": (
-        lambda case: case.joint.type in TURNING_PAIRS and not isinstance(case.joint.seat, Seat),
-        "needs none: its length moves with one link, or its seat is stated",
-    ),
-}
-# and what is a remark, not a mistake
-REMARKS: Mapping[str, tuple[Callable[[_Case], bool], str]] = {
-    "pin.length": (lambda case: case.by_length, _UNUSED),
-    "pin.bearing": (lambda case: case.by_length, _UNUSED),
-    "guide.height": (lambda case: case.joint.contact is not None, "is not in play: it is not used"),
-    "stiffness.axial": (lambda case: case.spatial, _UNUSED),
-    "stiffness.tilting": (lambda case: case.spatial or not case.pair.turns, _UNUSED),
-}
+def _effects(joint: Joint, spatial: bool, decided: bool) -> list[tuple[str, bool, str]]:
+    """Keys of a joint, whether each has an effect, and what is said of the joint where it has none.
+
+    decided: whether statics decides every reaction.
+    """
+    pair, pin, seat, friction = PAIRS[joint.type], joint.pin, joint.seat, joint.friction
+    law, model = (friction.law, friction.model) if friction else ("", "")
+    in_play, on_axis = joint.contact is not None, spatial and not pair.ball
+    leans = isinstance(seat, Seat) and seat.beta is not None and seat.beta.source != 0
+    # the length of a pin counts by the bearing moment, or in the plane with the radius by the pressure
+    by_length, unused = on_axis if spatial else pin is not None and pin.radius is not None, "has no use for it"
+    return [
+        ("pin", pair.turns, "has no pin"),
+        ("pin.offset", on_axis, "has no axis to offset its bearing along"),
+        ("pin.end_float", spatial and pair.pivot, "has no play along an axis"),
+        ("guide", pair.guided, "has no guide"),
+        ("guide.width", spatial, "carries no torsion about its slide"),
+        ("pitch", pair.threaded, "has no pitch"),
+        ("losses", bool(pair.motions), "has no one axis for a loss to act about or along"),
+        ("friction", pair.turns or pair.guided, "has no contact whose friction is modelled"),
+        ("friction.model", model != "pezzuti" or on_axis, "carries no bearing moment, which the model pezzuti is of"),
+        ("friction.backward", pair.count == 1 and not in_play,
+         "has no one freedom, forward and backward, or is in play"),
+        ("friction.law", law != "rolling" or (pair.pivot and not in_play),
+         "does not roll: of a slide on rollers state the coefficient arm over radius"),
+        ("misalignment", pair.bored, "has no plain pin whose misalignment is modelled"),
+        ("misalignment.tilt", spatial, "cannot tilt"),
+        ("contact", _touches(pair, spatial), "has no contact in play that is modelled"),
+        ("seat", joint.type in PLAY_PAIRS, "has no play that is modelled, and so no seat"),
+        ("seat.beta", not pair.ball and (spatial or pair.guided or not leans),
+         "does not tilt, or has its seat stated by a direction"),
+        ("seat.xi", not pair.ball, "has its seat stated by a direction"),
+        ("seat.direction", pair.ball, "has its seat stated by angles, xi and beta"),
+        ("seat_on", joint.type in TURNING_PAIRS and not isinstance(seat, Seat),
+         "needs none: its length moves with one link, or its seat is stated"),
+        ("pin.length", by_length, unused), ("pin.bearing", by_length, unused), ("guide.height", in_play, unused),
+        ("stiffness.radial", not decided, "has its reaction decided without over_constraint: minimum-norm"),
+        ("stiffness.axial", spatial, unused), ("stiffness.tilting", spatial or not pair.turns, unused),
+    ]  # fmt: skip
+
+
+def _touches(pair: Pair, spatial: bool) -> bool:
+    """Whether the contact of a pair in play is modelled."""
+    return pair.bored if spatial else pair.planar and (pair.pivot or pair.guided)
 
 
 def _vain(mechanism: Numbers) -> Iterator[Finding]:
     """Keys that a joint states without effect; of the defaults those that have none in any joint."""
     findings: dict[str, Finding] = {}
     used: set[str] = set()
+    spatial, decided = mechanism.space == "spatial", mechanism.over_constraint == "refuse"
     for name, joint in mechanism.effective_joints.items():
-        case, lost = _Case(joint, PAIRS[joint.type], mechanism.space == "spatial"), set[str]()
-        for key, (applies, why) in {**USES, **REMARKS}.items():
+        lost: set[str] = set()
+        for key, applies, why in _effects(joint, spatial, decided):
             part = key.partition(".")[0]
             own, default = _value(mechanism.stated_joints[name], key), _value(mechanism.joint_defaults, key)
             if part in lost or _value(joint, key) in (None, "free") or (own is None and default is None):
@@ -136,12 +109,13 @@ def _vain(mechanism: Numbers) -> Iterator[Finding]:
             if key == "friction" and _is_off(joint.friction):
                 continue
             where = f"joint_defaults.{key}" if own is None and part != "friction" else f"joints.{name}.{key}"
-            if applies(case):
+            if applies:
                 used.add(where)
                 continue
             lost.add(part if key == part else key)
-            what = f"a {joint.type} joint in {'space' if case.spatial else 'the plane'} {why}"
+            what = f"a {joint.type} joint in {'space' if spatial else 'the plane'} {why}"
             severity = Severity.NOTE if key in REMARKS else Severity.ERROR
+            what += ": it is not used" * (key in REMARKS)
             remedy = "remove it, or state 0 for this joint" if part == "friction" else "remove it"
             findings.setdefault(where, Finding(what, where, remedy, severity))
     yield from (finding for where, finding in findings.items() if where not in used)
@@ -173,29 +147,25 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
         remedy = "state pin: {clearance: …}, hole_radius or a fit"
         yield Finding("no joint has play", "joint_defaults.seat", remedy, Severity.WARNING)
     for name, joint in mechanism.effective_joints.items():
-        where, stated_joint = f"joints.{name}", mechanism.stated_joints[name]
-        case = _Case(joint, PAIRS[joint.type], spatial)
-        if not spatial and not case.pair.planar:
-            flat = ", ".join(pair for pair in PAIRS if PAIRS[pair].planar)
+        where = f"joints.{name}"
+        pair = PAIRS[joint.type]
+        if not spatial and not pair.planar:
+            flat = ", ".join(kind for kind in PAIRS if PAIRS[kind].planar)
             yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
         if name in mechanism.joints:
             yield from _ends(mechanism, name, joint)
-        yield from _lacks(case, where)
+        yield from _lacks(joint, pair, spatial, where)
         if joint.friction is not None:
-            yield from _parameters_of_law(
-                joint.friction, "joint_defaults.friction" if stated_joint.friction is None else f"{where}.friction"
-            )
+            by_default = mechanism.stated_joints[name].friction is None
+            yield from _parameters_of_law(joint.friction, f"{'joint_defaults' if by_default else where}.friction")
         if joint.seat_on is not None and joint.seat_on not in joint.links:
             remedy = f"name {' or '.join(joint.links)}"
             yield Finding(f"'{joint.seat_on}' is no link of this joint", f"{where}.seat_on", remedy)
         if joint.contact is not None:
-            yield from _in_play(mechanism, name, case)
+            yield from _in_play(mechanism, name, pair, spatial)
         if isinstance(limits := _fit(mechanism, name), Finding):
             yield limits
-        if joint.stiffness is not None and mechanism.over_constraint == "refuse":
-            what, remedy = "stiffness is not used where reactions are decided", "state over_constraint: minimum-norm"
-            yield Finding(what, f"{where}.stiffness.radial", remedy, Severity.NOTE)
-        guide = joint.guide if spatial and joint.friction and case.pair.guided else None
+        guide = joint.guide if spatial and joint.friction and pair.guided else None
         if guide and guide.length and guide.width is None:
             what = "without a width of the guide its torsion about the slide is carried without friction"
             yield Finding(what, where, "state guide: {width: …} if it does not slide on a round bar", Severity.NOTE)
@@ -215,9 +185,8 @@ def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
             yield Finding(what, f"links.{link}.points.{name}", f"write {key}: {{at: {position}, axis: {axis}}}")
 
 
-def _lacks(case: _Case, where: str) -> Iterator[Finding]:
+def _lacks(joint: Joint, pair: Pair, spatial: bool, where: str) -> Iterator[Finding]:
     """What a joint lacks that something else of it needs."""
-    joint, pair, spatial = case
     pin, guide, contact = joint.pin, joint.guide, joint.contact
     rubs = joint.friction is not None and (pair.turns or pair.guided) and not _is_off(joint.friction)
     lacks = contact_lacks(joint, spatial) if rubs else ()
@@ -225,14 +194,12 @@ def _lacks(case: _Case, where: str) -> Iterator[Finding]:
     seated, has = joint.seat != "free" and joint.type in PLAY_PAIRS, has_play(joint)
     short = not pair.ball and not (guide and guide.length if pair.guided else pin and (pin.length or pin.bearing))
     clear = f"state {part}: {{clearance: …}}" + ", hole_radius or a fit" * pair.turns
+    body = {"radius": "radius of the ball" if pair.ball else "radius of the pin", "length": "length of the guide",
+            "bearing": "length of the bearing, which carries a moment in space"}  # fmt: skip
     yield from faults(
         where,
-        ("radius" in lacks, "", f"friction without the radius of the {'ball' if pair.ball else 'pin'}",
-         "state pin: {radius: …}, a fit, or friction: 0"),
-        ("bearing" in lacks, "", "friction without the length of the bearing, which carries a moment in space",
-         "state pin: {bearing: …} or {length: …}, or friction: 0"),
-        ("length" in lacks, "", "friction without the length of the guide",
-         "state guide: {length: …}, or friction: 0"),
+        *((True, "", f"friction without the {body[size]}", f"state {part}: {{{size}: …}}, or friction: 0")
+          for size in lacks),
         (pair.threaded and joint.pitch is None, "", "a helical joint without a pitch",
          "add pitch: 5 mm, the slide of one turn, negative for a left-hand thread"),
         (no_radius and pin and pin.hole_radius is not None, "", "a hole radius without that of the pin"),
@@ -240,20 +207,20 @@ def _lacks(case: _Case, where: str) -> Iterator[Finding]:
         (seated and has and (spatial or pair.guided) and short, "", f"a seat without the length of the {part}",
          f"state {part}: {{length: …}}, or seat: free"),
     )  # fmt: skip
-    if contact is None or not case.touches:
+    if contact is None or not _touches(pair, spatial):
         return
     across = has and (not spatial or (pin is not None and (pin.clearance is not None or pin.hole_radius is not None)))
-    soft, by_modulus = not contact.of.rigid, contact.modulus is not None
+    shouldered = spatial and pair.pivot and not (pin and pin.end_float is not None)
+    by_modulus, needs = contact.modulus is not None, {"clearance": not across, "length": spatial and short}
     yield from faults(
         where,
-        (not across, "", "a joint in play without its clearance", f"add {part}: {{clearance: …}}"),
-        (spatial and short, "", "a pin in play in space without the length between its ends", "add pin: {length: …}"),
-        (spatial and pair.pivot and not (pin and pin.end_float is not None), "",
-         "a pin in play in space without the play of its shoulders",
+        *((lacking, "", f"a joint in play without its {size}", f"add {part}: {{{size}: …}}")
+          for size, lacking in needs.items()),
+        (shouldered, "", "a joint in play without its end_float",
          "add pin: {end_float: …}, end to end, or use type: cylindrical for a pin without shoulders"),
-        (soft and contact.stiffness is None and not by_modulus, "", "a contact without stiffness or modulus",
-         "state stiffness: 60e9 N/m^1.5, or modulus: 210 GPa"),
-        (soft and by_modulus and no_radius, "", "stiffness by a modulus without the pin's radius"),
+        (not contact.of.rigid and contact.stiffness is None and not by_modulus, "",
+         "a contact without stiffness or modulus", "state stiffness: 60e9 N/m^1.5, or modulus: 210 GPa"),
+        (not contact.of.rigid and by_modulus and no_radius, "", "stiffness by a modulus without the pin's radius"),
     )  # fmt: skip
 
 
@@ -269,18 +236,18 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
             yield Finding(f"the friction law {law} needs '{key}'", where, parameter.meaning)
 
 
-def _in_play(mechanism: Numbers, name: str, case: _Case) -> Iterator[Finding]:
+def _in_play(mechanism: Numbers, name: str, pair: Pair, spatial: bool) -> Iterator[Finding]:
     """What else speaks of a joint that is in play, which has no one coordinate, and laws that are of others."""
-    contact = case.joint.contact
+    contact = mechanism.effective_joints[name].contact
     users = [f"drivers.{name}"] * (name in mechanism.drivers)
     users += [f"loads.{key}" for key, load in mechanism.loads.items() if load.joint == name]
     users += [f"springs.{key}" for key, spring in mechanism.springs.items() if spring.joint == name]
     users += [f"gears.{key}" for key, gear in mechanism.gears.items() if name in gear.joints]
     yield from faults(
         f"joints.{name}.contact",
-        (contact and case.spatial and contact.of.rigid, "law",
+        (contact and spatial and contact.of.rigid, "law",
          "impacts of rigid bodies are of planar joints: the ends of a pin in space would strike one by one"),
-        (contact and contact.modulus is not None and case.pair.guided, "modulus",
+        (contact and contact.modulus is not None and pair.guided, "modulus",
          "a slider in a guide touches with an edge, whose stiffness does not follow from a modulus",
          "state stiffness: … and exponent: 1 instead"),
         *((True, "", "a joint that is in play has no one coordinate to drive, to load, to couple or to measure",

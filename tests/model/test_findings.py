@@ -109,7 +109,7 @@ MISTAKES = {
         "{radius: 7.5 mm}": [
             ("{length: 7.5 mm}", "joints.A", "friction without the radius of the pin", -5),
             ("{radius: 0}", "joint_defaults.pin.radius", "is 0, where friction needs it")],
-        "7.5 mm}": [("7.5 mm, clearance: 8 mm}", "joint_defaults.pin.clearance", "not less than the radius")],
+        "7.5 mm}": [("7.5 mm, clearance: 8 mm}", "joint_defaults.pin.clearance", "not less than the pin radius")],
         "friction: 0.1": [
             ("friction: {coeficient: 0.1}", "joint_defaults.friction.coeficient", "unknown to the"),
             ("friction: {pair_factor: 1}", "friction", "needs 'coefficient'")],

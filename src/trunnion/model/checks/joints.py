@@ -267,46 +267,39 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
 
     def at(path: str) -> str:
         """Where a value stands: with the joint or with the defaults."""
-        return numbers.entries[f"{where}.{path}"].alias or f"{where}.{path}"
+        entry = numbers.entries.get(f"{where}.{path}")
+        return entry.alias if entry and entry.alias else f"{where}.{path}"
 
-    rolls = joint.friction is not None and joint.friction.law == "rolling"
+    rolls, contact = joint.friction is not None and joint.friction.law == "rolling", joint.contact
     sizes = ["guide.length", *["pin.radius"] * (not rolls)]
     sizes += ["pin.bearing", "guide.width"] if mechanism.space == "spatial" else []
-    for size in sizes:
-        if joint.friction is not None and value(size) == 0:
-            yield Finding("is 0, where friction needs it", at(size))
-    for part, size in (("pin", "radius"), ("guide", "length")):
-        gap, body = value(f"{part}.clearance"), value(f"{part}.{size}")
-        if gap >= body > 0:
-            yield Finding(f"is {_mm(gap)}, not less than the {size} {_mm(body)} of the {part}", at(f"{part}.clearance"))
-    yield from _contact_values(joint, values, where)
     between = float((clearance(name, values) or 0.0) + value("pin.cylindricity", 0.0))
-    if has_pin(joint.type) and joint.type not in PLAY_PAIRS and between != 0:
-        what = f"the play of {_um(between)} of a {joint.type} joint is not modelled"
-        radius = f"radius: {1e3 * value('pin.radius'):.6g} mm, " * (value("pin.radius") >= 0)
-        yield Finding(what, f"{where}.pin", f"state pin: {{{radius}clearance: 0, cylindricity: 0}} here")
+    unmodelled = has_pin(joint.type) and joint.type not in PLAY_PAIRS and between != 0
+    radius = f"radius: {1e3 * value('pin.radius'):.6g} mm, " * (value("pin.radius") >= 0)
+    yield from faults(
+        "",
+        *((joint.friction is not None and value(size) == 0, at(size), "is 0, where friction needs it")
+          for size in sizes),
+        *((value(gap) >= value(body) > 0, at(gap),
+           f"is {_mm(value(gap))}, not less than the {body.replace('.', ' ')} {_mm(value(body))}")
+          for gap, body in (("pin.clearance", "pin.radius"), ("guide.clearance", "guide.length"))),
+        (unmodelled, f"{where}.pin", f"the play of {_um(between)} of a {joint.type} joint is not modelled",
+         f"state pin: {{{radius}clearance: 0, cylindricity: 0}} here"),
+    )  # fmt: skip
+    if contact is not None:
+        across = between if clearance(name, values) is not None else np.nan
+        yield from faults(
+            where,
+            (across <= 0, "contact", f"has a clearance of {across:g} m, and the joint is in play"),
+            *((value(key) <= 0, key, f"is {value(key):g} m, and the joint is in play") for key in PIN_LENGTHS),
+            (value("contact.restitution") == 0 and not contact.of.rigid, "contact.restitution",
+             "is 0, which is of rigid bodies alone"),
+            (contact.modulus is not None and value("contact.exponent", 1.5) != 1.5, "contact.exponent",
+             "the stiffness by a modulus goes with the exponent 1.5"),
+        )  # fmt: skip
     if has_play(joint):
         yield from _fitted(mechanism, name, joint, value("pin.radius"), value("pin.hole_radius"), at)
         yield from _play_size(mechanism, name, joint, values)
-
-
-def _contact_values(joint: Joint, values: Mapping[str, Number], where: str) -> Iterator[Finding]:
-    """Whether the numbers of a contact can be those of one. values: by path; where: path of the joint."""
-    contact = joint.contact
-    if contact is None:
-        return
-    gap = clearance(where.removeprefix("joints."), values)
-    across = np.nan if gap is None else gap + values.get(f"{where}.pin.cylindricity", 0.0)
-    lengths = {key: values.get(f"{where}.{key}", np.nan) for key in PIN_LENGTHS}
-    yield from faults(
-        where,
-        (across <= 0, "contact", f"has a clearance of {across:g} m, and the joint is in play"),
-        *((length <= 0, key, f"is {length:g} m, and the joint is in play") for key, length in lengths.items()),
-        (values.get(f"{where}.contact.restitution") == 0 and not contact.of.rigid, "contact.restitution",
-         "is 0, which is of rigid bodies alone"),
-        (contact.modulus is not None and values.get(f"{where}.contact.exponent", 1.5) != 1.5, "contact.exponent",
-         "the stiffness by a modulus goes with the exponent 1.5"),
-    )  # fmt: skip
 
 
 def _fit(mechanism: Numbers, name: str) -> FitLimits | Finding | None:

@@ -98,7 +98,7 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
         where, (first, second) = f"gears.{name}", gear.joints
         sliding = [joint for joint in gear.joints if not has_pin(joints[joint].type)]
         shared, screw = {*joints[first].links} & {*joints[second].links}, gear.lead is not None
-        wrong = [*faults(
+        yield from faults(
             where,
             (mechanism.space == "spatial", "", "gear pairs are planar"),
             (name in joints, "", "a joint has this name too"),
@@ -107,24 +107,11 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
              "state radius: … of the wheel (rack, chain, rope), or lead: … (screw)"),
             (not sliding and gear.slides, "lead" if screw else "radius", "is stated, and both joints turn",
              "state ratio: …"),
-        )]  # fmt: skip
-        yield from wrong
-        if wrong:
-            continue
-        yield from faults(
-            where,
             (len(shared) == 2, "joints", "both joints are between the same two links"),
             (gear.touches and not shared, "",
              f"'{first}' and '{second}' have no link in common that carries both gears, or wheel and rack",
              "guide both on one link, or state teeth: false for a train, belt or chain that passes torques alone"),
         )  # fmt: skip
-        thread = mechanism.joints.get(mechanism.coupled(name)[0]) if screw else None
-        rubs = thread is not None and joints[mechanism.coupled(name)[0]].friction is not None
-        if rubs and thread and not (thread.friction and thread.pin and thread.pin.radius):
-            joint = mechanism.coupled(name)[0]
-            remedy = f"state friction and pin.radius of {joint}, the mean radius of the thread, or friction: 0"
-            yield Finding(f"its thread rubs as the pin of {joint} does by joint_defaults", where, remedy,
-                          Severity.WARNING)  # fmt: skip
 
 
 def gear_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:

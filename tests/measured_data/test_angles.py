@@ -27,8 +27,6 @@ def clean() -> Columns:
     columns["fine"] = np.floor(columns["angle"] / (2 * np.pi) * 1440)
     columns["wrapped"] = columns["encoder"] % 256
     columns["each turn"] = columns["encoder"] % 60
-    columns["level"] = (columns["angle"] / (2 * np.pi) * 60 % 1 < 0.5) * 5.0
-    columns["sinus"] = np.sin(60 * columns["angle"])
     columns["z"] = (columns["angle"] / (2 * np.pi) % 1 < 0.02) * 1.0
     columns["down"] = np.floor(-columns["angle"] / (2 * np.pi) * 60)
     return columns
@@ -40,9 +38,6 @@ SOURCES: dict[str, tuple[dict[str, Any], float]] = {
     "wraps at 256": ({"from": "pulses", "column": "wrapped", "per_turn": 60, "wrap": 256}, 0.05),
     "set back each turn": ({"from": "pulses", "column": "each turn", "per_turn": 60, "wrap": 60}, 0.05),
     "index": ({"from": "pulses", "column": "encoder", "per_turn": 60, "index": {"column": "z"}}, 0.08),
-    "level": ({"from": "pulses", "column": "level", "per_turn": 60, "kind": "level", "zero": "24 deg"}, 0.05),
-    # its level passes the middle at 24° + 0: sin(60 θ) rises through zero at multiples of 6°
-    "analog": ({"from": "pulses", "column": "sinus", "per_turn": 60, "kind": "level", "zero": "24 deg"}, 0.05),
     "counts down": ({"from": "pulses", "column": "down", "per_turn": 60, "sign": -1}, 0.05),
     "column": ({"from": "column", "column": "deg", "unit": "deg"}, 4e-3),
     "column in rad": ({"from": "column", "column": "angle"}, 4e-3),

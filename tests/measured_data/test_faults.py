@@ -236,6 +236,3 @@ def test_sampling_too_slow(run: Columns, tmp_path: Path) -> None:
     assert "data.sampling.slow" in codes(read(thin, tmp_path))
     with pytest.raises(MechanismError, match=r"sampling is too slow for the filter: 50 Hz, a cut-off of 40 Hz"):
         read(thin, tmp_path, {"filter": {"cut_off": "40 Hz"}})
-    level = {**run, "encoder": (run["angle"] / (2 * np.pi) * 60 % 1 < 0.5) * 5.0}
-    thin = {name: values[::5] for name, values in level.items()}
-    assert "data.pulses.few_samples" in codes(read(thin, tmp_path, {"angle/kind": "level"}))

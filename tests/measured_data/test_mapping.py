@@ -89,7 +89,6 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"angle": {"from": "pulses", "column": "encoder"}}, "angle", "needs per_turn"),
     ({"angle": {"from": "column", "column": "a", "per_turn": 60}}, "angle", "does not use per_turn"),
     ({"angle": {"from": "time", "speed": 0}}, "angle", "the speed is zero"),
-    ({"angle/wrap": 9, "angle/kind": "level"}, "angle", "only a running count wraps"),
     ({"time": {"column": "t", "rate": "1 kHz"}}, "time", "either a column or a rate"),
     ({"time": {"rate": "0 Hz"}}, "time.rate", "not a frequency above zero"),
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from measured_data.four_bar import rocker
-from trunnion.rig.reading import steps
+from trunnion.rig.reading import turns as steps
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.steps import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
+from trunnion.rig.reading.turns import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import pytest
 import trunnion
 from trunnion.rig.comparison import Verdict
 from trunnion.rig.modelled import RIPPLE, over_pulses
-from trunnion.rig.virtual.sensors import pulsed
+from trunnion.rig.virtual.rig_file import pulsed
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FRICTION = "joint_defaults.friction.coefficient"
@@ -46,11 +46,6 @@ COMPRESSOR = {
 CAMPAIGNS: dict[str, tuple[str, dict[str, float], dict[str, Any], int]] = {
     "true": ("pezzuti-cardan", {}, cardan_rig(TORQUE), 4),
     "less friction": ("pezzuti-cardan", {FRICTION: 0.36}, cardan_rig(TORQUE), 4),
-    "level": (
-        "pezzuti-cardan", {},
-        cardan_rig(TORQUE, rate="20 kHz", encoder={"per_turn": 60, "kind": "level"},
-                   schedule={"over": {"misalignment": ["10 deg", "20 deg"]}, "turns": 10, "idle": "0.5 s"}), 7,
-    ),
     "steps": (
         "pezzuti-cardan", {FRICTION: 0.36},
         cardan_rig(COARSE, schedule={"over": {"misalignment": ["5 deg", "25 deg"]}, "turns": 20, "idle": "0.5 s"}), 6,
@@ -94,7 +89,6 @@ def test_verdicts(campaign: Campaign, name: str) -> None:
     [
         ("true", [0.90343, 0.89241, 0.84817, 0.79544], [0.00448, 0.004409, 0.004131, 0.003811]),
         ("less friction", [0.92633, 0.91149, 0.87271, 0.82615], [0.004629, 0.004532, 0.004284, 0.003996]),
-        ("level", [0.89004, 0.84566], [0.004399, 0.00412]),
         ("steps", [0.92507, 0.84794], [0.016642, 0.015445]),
     ],
 )
@@ -109,7 +103,6 @@ def test_efficiencies(campaign: Campaign, name: str, efficiency: list[float], ex
     ("name", "path", "estimate", "uncertainty", "reduced"),
     [
         ("less friction", FRICTION, 0.359740, 1.6695e-4, 1.149),
-        ("level", FRICTION, 0.419973, 8.585e-5, 0.9973),
         ("steps", FRICTION, 0.354908, 4.259e-3, 0.7186),
         ("compressor", "S.friction.coefficient", 0.060825, 1.7229e-3, 0.9779),
     ],

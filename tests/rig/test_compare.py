@@ -14,8 +14,8 @@ import trunnion
 from rig_measurements import course, measured, rocker
 from trunnion import MechanismError, Status
 from trunnion.errors import Severity
-from trunnion.rig.comparison import CAUSES, VARIABLES, Verdict, causes, expanded, independent, judge, uncertainty_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.comparison import CAUSES, VARIABLES, Verdict, causes, independent, judge
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, student
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POWERS = ("torque", "speed", "brake", "out")
@@ -95,14 +95,14 @@ def test_a_true_model_is_within_in_about_95_percent(turns, zero, gain, off, smoo
 def test_expanded_uncertainty_is_that_of_the_gum():
     """k_p for 95.45 %: GUM, Table G.2."""
     freedom = np.array([1.0, 2.0, 5.0, 10.0, 50.0, np.inf])
-    assert expanded(np.ones(6), freedom, 2.0) == pytest.approx([13.97, 4.53, 2.65, 2.28, 2.05, 2.0], abs=0.005)
+    assert student(freedom, 2.0) == pytest.approx([13.97, 4.53, 2.65, 2.28, 2.05, 2.0], abs=0.005)
 
 
 def test_degrees_of_freedom_count_what_scatters_only():
     turns = np.random.default_rng(0).normal(size=(4, 10))
-    alone = uncertainty_of(course("torque", turns))
+    alone = course("torque", turns).parts()
     assert alone.freedom == pytest.approx(3.0)
-    with_zero = uncertainty_of(course("torque", turns, Accuracy(zero=100.0)))
+    with_zero = course("torque", turns, Accuracy(zero=100.0)).parts()
     assert (with_zero.freedom > 1e6).all()
     assert with_zero.total == pytest.approx(np.hypot(alone.total, 100.0))
     assert with_zero.total == pytest.approx(course("torque", turns, Accuracy(zero=100.0)).uncertainty)
@@ -110,8 +110,8 @@ def test_degrees_of_freedom_count_what_scatters_only():
 
 def test_positions_that_vary_together_count_as_one():
     random = np.random.default_rng(2)
-    apart = uncertainty_of(course("torque", random.normal(size=(40, 50))))
-    together = uncertainty_of(course("torque", np.repeat(random.normal(size=(40, 1)), 50, axis=1)))
+    apart = course("torque", random.normal(size=(40, 50))).parts()
+    together = course("torque", np.repeat(random.normal(size=(40, 1)), 50, axis=1)).parts()
     assert independent(apart) > 35
     assert independent(together) == pytest.approx(1.0, abs=0.2)
 

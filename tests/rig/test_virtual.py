@@ -213,8 +213,6 @@ def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> Non
         ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,
           "sensors": {"a": {"measures": "effort:A"}}}, "encoder", "nothing measures the angle of A"),
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}}, "encoder", "turn in both directions"),
-        ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}, "encoder": {"per_turn": 60, "kind": "level"}},
-         "encoder.kind", "turn in both directions"),
         ({"set": {"l7": 2}}, "set", "l7"),
         ({"rate": "0.4 Hz", "schedule": {"turns": 1}}, "rate", "no three samples"),
         ({"rate": "300 MHz"}, "rate", "rows, a file at most"),
@@ -249,10 +247,9 @@ def test_a_range_is_run_through_once() -> None:
     assert mapping["channels"]["e"]["zero"]["over"][0] == "-1 s"
 
 
-def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None:
+def test_clipped_readings_are_told(mechanism: Mechanism) -> None:
     sensors = SENSORS | {"T1": SENSORS["T1"] | {"range": "1 N m"}}
-    found = trunnion.rig.observe(mechanism, rig(sensors=sensors, encoder={"per_turn": 360, "kind": "level"}))
+    found = trunnion.rig.observe(mechanism, rig(sensors=sensors))
     told = {one.where: one.what for one in found.findings}
     assert "readings are clipped" in told["sensors.T1.range"]
-    assert "pulses are lost" in told["encoder.kind"]
     assert np.max(np.abs(next(found.records()).columns["T1"])) <= 1.0

@@ -8,13 +8,22 @@ from pydantic import ValidationError
 
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.units import read_amount, scale
-from trunnion.rig.virtual import sensors as virtual_sensors
 from trunnion.rig.virtual.observe import phases
-from trunnion.rig.virtual.rig_file import Sensor
-from trunnion.rig.virtual.sensors import SensorErrors, converted, draw, pulsed, readings, resolved, smoothed, stream
+from trunnion.rig.virtual.rig_file import (
+    Sensor,
+    SensorChannel,
+    SensorErrors,
+    converted,
+    draw,
+    pulsed,
+    readings,
+    resolved,
+    smoothed,
+    stream,
+)  # fmt: skip
 
 
-def channel(si: str = "N m", **stated: object) -> virtual_sensors.SensorChannel:
+def channel(si: str = "N m", **stated: object) -> SensorChannel:
     return resolved("s", Sensor(**{"measures": "effort:A", **stated}), "s", si)
 
 

@@ -34,7 +34,15 @@ from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import joined, number, readable
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
-from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, pairs_of, rms, student
+from trunnion.rig.reading.measurement import (
+    Condition,
+    Measurement,
+    Signal,
+    Uncertainty,
+    efficiency_of,
+    pairs_of,
+    rms,
+)  # fmt: skip
 from trunnion.rig.reading.timebase import gathered
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
@@ -43,8 +51,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "CAUSES", "VARIABLES", "Uncertainty", "Verdict", "causes", "compare", "data_findings", "expanded", "hashed_files",
-    "independent", "judge", "other_speed", "uncertainty_of", "written_unit",
+    "CAUSES", "VARIABLES", "Verdict", "causes", "compare", "data_findings", "hashed_files", "independent", "judge",
+    "other_speed", "written_unit",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -142,9 +150,23 @@ def compare(
     measures, method = _measures(measurement, channels), friction_method or FrictionMethod()
     rows = each(measurement.conditions, lambda item: _compared(mechanism, item, measures, coverage, method), progress)
     sets = list(dict.fromkeys(name for row in rows for name in row.condition.values))
-    labels = {"channel": list(measures), "condition": [row.condition.name for row in rows], "set": sets}
+    channels, positions = list(measures), max(len(row.condition.phase) for row in rows)
+    sizes = {"set": len(sets), "condition": len(rows), "channel": len(channels), "position": positions}
+    arrays: dict[str, NDArray[Any]] = {name: variable.blank(sizes) for name, variable in VARIABLES.items()}
+    arrays["verdict"][:], arrays["efficiency_within"][:] = Verdict.NOTHING, -1
+    arrays["status"][:] = Status.NOT_ASSEMBLED  # of positions that a condition with fewer does not have
+    for k, row in enumerate(rows):
+        arrays["value"][:, k] = [row.condition.values.get(name, np.nan) for name in sets]
+        for channel, figures in row.figures.items():
+            at: dict[str, int | slice] = {"condition": k, "position": slice(0, len(row.condition.phase))}
+            at["channel"] = channels.index(channel) if channel else 0
+            for name, figure in figures.items():
+                arrays[name][tuple(at[dim] for dim in VARIABLES[name].dims)] = figure
+    if not any("efficiency" in row.figures[""] for row in rows):
+        arrays = {name: array for name, array in arrays.items() if not name.startswith("efficiency")}
+    labels = {"channel": channels, "condition": [row.condition.name for row in rows], "set": sets}
     attributes = _attributes(mechanism, measurement, measures, sets, rows, coverage, method)
-    return dataset_of("comparison", described(_arrays(list(measures), sets, rows), VARIABLES), labels, attributes)
+    return dataset_of("comparison", described(arrays, VARIABLES), labels, attributes)
 
 
 def _measures(measurement: Measurement, channels: Sequence[str] | None) -> dict[str, str]:
@@ -295,52 +317,6 @@ class Verdict(Coded):
     NOTHING = 4, "no data"
 
 
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Standard uncertainty of a course, (position,), in its parts.
-
-    random: of the mean over the turns; local: what else each position has by itself, such as the resolution; shared:
-    (part, position), of the zero, the gain and the angle, each the same at all positions; turns: deviations of the
-    turns from their mean, (turn, position).
-    """
-
-    random: Array
-    local: Array
-    shared: Array
-    count: NDArray[np.intp]
-    turns: Array
-
-    @property
-    def total(self) -> Array:
-        """All together, NaN with fewer than two turns."""
-        return np.asarray(np.sqrt(self.random**2 + self.local**2 + np.sum(self.shared**2, axis=0)))
-
-    @property
-    def freedom(self) -> Array:
-        """Effective degrees of freedom by Welch and Satterthwaite, infinite without scatter; GUM, G.4.1."""
-        with np.errstate(all="ignore"):
-            freedom = (self.count - 1) / (self.random**2 / self.total**2) ** 2
-        return np.where(np.isfinite(freedom), freedom, np.inf)
-
-    def at(self, where: NDArray[np.bool_]) -> Uncertainty:
-        """That of some of the positions."""
-        return Uncertainty(*(part[..., where] for part in vars(self).values()))
-
-
-def uncertainty_of(signal: Signal, angle: Array | float = 0.0) -> Uncertainty:
-    """The parts of a signal's uncertainty; angle: (position,), that by the angle of the drive."""
-    zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
-    random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
-    local = np.hypot(np.full_like(random, signal.unresolved), signal.local)
-    shared = np.array([zero, signal.accuracy.gain * signal.read, np.broadcast_to(angle, zero.shape)])
-    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
-
-
-def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
-    """U = k_p u, with k_p of Student's distribution; GUM, G.3.2."""
-    return np.asarray(student(freedom, coverage) * standard)
-
-
 def judge(
     signal: Signal,
     model: Array,
@@ -355,10 +331,10 @@ def judge(
     the angle of the drive. Returns courses, figures of the residual and verdict, by the name of the variable of a
     comparison; no figures where nothing can be compared.
     """
-    where, every = comparable & np.isfinite(signal.mean) & np.isfinite(model), uncertainty_of(signal, angle)
+    where, every = comparable & np.isfinite(signal.mean) & np.isfinite(model), signal.parts(angle)
     courses: dict[str, Any] = {
         "measured": signal.mean, "scatter": signal.scatter, "uncertainty": every.total,
-        "expanded": expanded(every.total, every.freedom, coverage), "model": model,
+        "expanded": every.expanded(coverage), "model": model,
         "residual": difference(signal.mean, model), "compared": where, "turns": len(signal.turns),
         "accuracy_zero": signal.accuracy.zero, "accuracy_gain": signal.accuracy.gain, "verdict": Verdict.NOTHING,
     }  # fmt: skip
@@ -373,7 +349,7 @@ def judge(
         local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
         shared = np.mean(of.shared, axis=1, keepdims=True)
         mean = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
-        bias_expanded = float(expanded(mean.total, mean.freedom, coverage)[0])
+        bias_expanded = float(mean.expanded(coverage)[0])
     if min(np.max(np.abs(course - np.mean(course))) for course in (measured, modelled)) > ROUNDING * size:
         correlation = float(np.corrcoef(measured, modelled)[0, 1])  # Pearson's; of none that is flat
     worst = int(np.argmax(np.abs(residual)))
@@ -402,7 +378,7 @@ def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -
 
     And whether the residual as a whole is less than `FAR`: the share says nothing of how far off the others are.
     """
-    limit, p = expanded(of.total, of.freedom, coverage), erf(coverage / sqrt(2.0))
+    limit, p = of.expanded(coverage), erf(coverage / sqrt(2.0))
     finite = np.isfinite(limit)
     if not np.any(finite):
         return np.nan, np.nan, False
@@ -439,24 +415,6 @@ def _nearly_complete(turns: Array) -> Array:
 
 
 # ---- the result -----------------------------------------------------------------------------------------------
-
-
-def _arrays(channels: list[str], sets: list[str], rows: Sequence[ConditionComparison]) -> dict[str, NDArray[Any]]:
-    """All variables; no efficiency where none was measured."""
-    positions = max(len(row.condition.phase) for row in rows)
-    sizes = {"set": len(sets), "condition": len(rows), "channel": len(channels), "position": positions}
-    arrays: dict[str, NDArray[Any]] = {name: variable.blank(sizes) for name, variable in VARIABLES.items()}
-    arrays["verdict"][:], arrays["efficiency_within"][:] = Verdict.NOTHING, -1
-    arrays["status"][:] = Status.NOT_ASSEMBLED  # of positions that a condition with fewer does not have
-    for k, row in enumerate(rows):
-        arrays["value"][:, k] = [row.condition.values.get(name, np.nan) for name in sets]
-        for channel, figures in row.figures.items():
-            at: dict[str, int | slice] = {"condition": k, "position": slice(0, len(row.condition.phase))}
-            at["channel"] = channels.index(channel) if channel else 0
-            for name, figure in figures.items():
-                arrays[name][tuple(at[dim] for dim in VARIABLES[name].dims)] = figure
-    measured = any("efficiency" in row.figures[""] for row in rows)
-    return {name: array for name, array in arrays.items() if measured or not name.startswith("efficiency")}
 
 
 def _attributes(
@@ -569,8 +527,9 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
     if off := [row for row, verdict in pairs if verdict in (Verdict.NOT, Verdict.OFFSET)]:
         rms = max(row.figures[name]["rms"] for row in off)
         within = 100 * min(row.figures[name]["within"] for row in off)
-        unit, size = off[0].signals[name].shown
-        rms_text = readable(rms, unit, 3) if unit in ("rad", "1") else joined(number(rms / size, 3), unit)
+        unit, size = off[0].signals[name].shown  # a speed in the unit of its file
+        turning = off[0].signals[name].unit == "rad/s"
+        rms_text = joined(number(rms / size, 3), unit) if turning else readable(rms, off[0].signals[name].unit, 3)
         offset = " apart from a constant offset" * (Verdict.NOT not in verdicts)
         what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
         what += f"agree, and the RMS of the residual is {rms_text}"

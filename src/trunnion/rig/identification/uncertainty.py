@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from trunnion.rig.identification.fit import Fit, sizes_of
 from trunnion.rig.reading.measurement import student
-from trunnion.rig.reading.steps import covariance_of_steps
+from trunnion.rig.reading.turns import covariance_of_steps
 
 __all__ = ["CONFIDENCE", "Covariances", "LackOfFit", "inseparable", "lack_of_fit", "quantile", "spread_of"]
 

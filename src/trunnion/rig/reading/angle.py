@@ -52,7 +52,7 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, say: Say) 
     """The coordinate of the driver by its source."""
     index, column = np.empty(0), table.columns.get(source.column or "")
     if source.index is not None:
-        index = _edges(line.rows(table.columns[source.index.column].values), line).times
+        index = _edges(line.rows(table.columns[source.index.column].values), line)
         if not index.size:
             what, remedy = f"the column '{source.index.column}' has no pulse", "check the column, or remove index"
             say(warning("index.none", "angle.index", what, remedy))
@@ -76,11 +76,10 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, say: Say) 
 
 
 class Pulses(NamedTuple):
-    """Times at which counts were reached, (pulse,). crossings: whether the times are finer than the sampling."""
+    """Times at which counts were reached, (pulse,), each to a sample."""
 
     times: Array
     counts: Array
-    crossings: bool = False
 
     def slack(self, step: float) -> float:
         """Counts from one sample to the next, in the mean while the shaft turns.
@@ -96,25 +95,13 @@ class Pulses(NamedTuple):
 def _of_pulses(source: AngleSource, readings: Array, line: Timeline, index: Array, say: Say) -> Coordinate:
     """The angle between pulses by interpolation in time, counted anew from every index pulse."""
     assert source.per_turn is not None
-    finite, until = np.isfinite(readings), np.inf
-    if source.kind == "level":
-        pulses = _edges(readings, line)
-        gaps = np.flatnonzero(np.diff(line.seconds) > GAP * line.step)
-        gaps = gaps[line.seconds[gaps + 1] < pulses.times.max(initial=-np.inf)]
-        if gaps.size and index.size < 2:
-            until = float(line.seconds[gaps[0]])
-            what = f"no pulses are counted in gaps of time: the turns after {until:.5g} s are left out"
-            say(warning("pulses.gap", "angle", what, "record a count or an index"))
-        if pulses.times.size > 2 and (samples := float(np.median(np.diff(pulses.times))) / line.step) < 2.5:
-            what = f"a pulse of the encoder has {samples:.3g} samples: edges are missed"
-            say(warning("pulses.few_samples", "angle", what, "sample at least 4 times a pulse, or record a count"))
-    else:
-        pulses = _counted(source, readings[finite], line.seconds[finite], line.step)
+    finite = np.isfinite(readings)
+    pulses = _counted(source, readings[finite], line.seconds[finite], line.step)
     if pulses.times.size < 2:
         what = f"the column '{source.column}' has {counted(pulses.times.size, 'pulse')}: there are no turns"
-        raise MechanismError(Finding(what, "angle", "check that angle.column is the encoder's, and angle.kind"))
-    (when, counts, _), spoilt, step = pulses, NOWHERE, line.step
-    slack, pitch, lag = pulses.slack(step), TURN / source.per_turn, 0.0
+        raise MechanismError(Finding(what, "angle", "check that angle.column is the encoder's count"))
+    (when, counts), spoilt, step = pulses, NOWHERE, line.step
+    slack, pitch = pulses.slack(step), TURN / source.per_turn
     if index.size > 1:
         at = np.interp(index[[0, -1]], when, counts)
         index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, step)
@@ -122,17 +109,15 @@ def _of_pulses(source: AngleSource, readings: Array, line: Timeline, index: Arra
     elif index.size == 1:
         counts = counts - np.interp(index[0], when, counts)
     angles = pitch * counts
-    if not pulses.crossings and slack < 1:  # a count for each event: its time is not known
+    if slack < 1:  # a count for each event: its time is not known
         when, spans = smoothed(when, 0.5 * step, source.per_turn, counts)
         lag = unresolved((pulses.times - when)[spans > 0], step)
-    elif not pulses.crossings:  # an event for each sample: its count is not known
+    else:  # an event for each sample: its count is not known
         raw = angles
         angles, spans = smoothed(raw, pitch * min(0.5 * slack, 0.5), source.per_turn / slack, when)
         lag = unresolved((raw - angles)[spans > 0], pitch) / pitch * step / slack
     say(f"the angle is interpolated between pulses {np.degrees(pitch):.4g} deg apart, and smoothed within a sample")
-    values = np.interp(line.seconds, when, angles, left=np.nan, right=np.nan)
-    values[line.seconds > until] = np.nan
-    return Coordinate(values, spoilt, lag)
+    return Coordinate(np.interp(line.seconds, when, angles, left=np.nan, right=np.nan), spoilt, lag)
 
 
 def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> Pulses:
@@ -157,12 +142,12 @@ def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) 
     return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (counts[at] + counts[at + 1] + 1.0))
 
 
-def _edges(readings: Array, line: Timeline) -> Pulses:
-    """Rising edges of a level: it passes the middle, having been in the lower two fifths since the last one."""
+def _edges(readings: Array, line: Timeline) -> Array:
+    """Times, s, of the rising edges of a level: it passes the middle, having been in the lower two fifths before."""
     finite = np.isfinite(readings)
     levels = readings[np.maximum.accumulate(np.where(finite, np.arange(readings.size), int(np.argmax(finite))))]
     if not finite.any() or levels.min() == levels.max():
-        return Pulses(np.empty(0), np.empty(0))
+        return np.empty(0)
     low, high = (float(end) for end in np.percentile(levels, (0.1, 99.9)))
     low, high = (low, high) if high > low else (float(levels.min()), float(levels.max()))
     state = np.where(levels > low + 0.6 * (high - low), 1, np.where(levels < low + 0.4 * (high - low), -1, 0))
@@ -171,9 +156,7 @@ def _edges(readings: Array, line: Timeline) -> Pulses:
     before = np.maximum(after - 1, 0)
     rise = np.where(levels[after] == levels[before], 1.0, levels[after] - levels[before])
     share = np.clip((low + 0.5 * (high - low) - levels[before]) / rise, 0, 1)
-    seconds = line.seconds[before] + share * (line.seconds[after] - line.seconds[before])
-    between = np.count_nonzero(state == 0) > 0.02 * state.size
-    return Pulses(seconds, np.arange(seconds.size, dtype=np.float64), crossings=bool(between))
+    return np.asarray(line.seconds[before] + share * (line.seconds[after] - line.seconds[before]))
 
 
 def _by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:

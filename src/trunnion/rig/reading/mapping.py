@@ -98,7 +98,7 @@ class AngleSource(Part):
     column: str | None = None
     unit: units.AngleUnit | None = None
     per_turn: Pulses | None = None
-    kind: Literal["count", "level"] | None = None
+    kind: Literal["count"] | None = None
     wrap: Annotated[int, Field(ge=2)] | None = None
     speed: units.AngularSpeed | None = None
     zero: units.Angle = units.ZERO
@@ -116,8 +116,6 @@ class AngleSource(Part):
         if extra := sorted(present - {*needed, *allowed}):
             remedy = f"remove it; the keys of from: {self.from_} are {', '.join((*needed, *allowed))}"
             raise problem(f"from: {self.from_} does not use {', '.join(extra)}", remedy)
-        if self.wrap is not None and self.kind == "level":
-            raise problem("only a running count wraps", "remove wrap, or write kind: count")
         if self.speed is not None and self.speed.value == 0:
             raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
         return self

@@ -18,7 +18,7 @@ from scipy.special import ndtr, stdtrit
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import finding_rows
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
-from trunnion.rig.reading.steps import LeftOfSteps
+from trunnion.rig.reading.turns import LeftOfSteps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COVERAGE", "Accuracy", "Condition", "Contribution", "Efficiency", "Measurement", "Powers", "Signal",
-    "between_turns", "dataset", "efficiency_of", "pairs_of", "rms", "student",
+    "Uncertainty", "between_turns", "dataset", "efficiency_of", "pairs_of", "rms", "student",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -122,14 +122,53 @@ class Signal:
 
     @cached_property
     def uncertainty(self) -> Array:
-        """Standard uncertainty of the mean, (position,): scatter/√n, zero, gain and resolution.
+        """Standard uncertainty of the mean, (position,); NaN with fewer than two turns."""
+        return self.parts().total
 
-        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns.
-        """
-        repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
+    def parts(self, angle: Array | float = 0.0) -> Uncertainty:
+        """Its parts: GUM (JCGM 100:2008), 4.2 and 5.1. angle: (position,), that by the angle of the drive."""
+        zero = np.full_like(self.mean, np.hypot(self.accuracy.zero, self.accuracy.cut))
+        random = self.scatter / np.sqrt(np.maximum(self.count, 1))
+        local = np.hypot(np.full_like(random, self.unresolved), self.local)
+        shared = np.array([zero, self.accuracy.gain * self.read, np.broadcast_to(angle, zero.shape)])
+        return Uncertainty(random, local, shared, self.count, self.turns - self.mean)
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Standard uncertainty of a course, (position,), in its parts.
+
+    random: of the mean over the turns; local: what else each position has by itself, such as the resolution; shared:
+    (part, position), of the zero, the gain and the angle, each the same at all positions; turns: deviations of the
+    turns from their mean, (turn, position).
+    """
+
+    random: Array
+    local: Array
+    shared: Array
+    count: NDArray[np.intp]
+    turns: Array
+
+    @property
+    def total(self) -> Array:
+        """All together, NaN with fewer than two turns."""
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
-            variance = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
-            return np.asarray(np.sqrt(repeated**2 + variance + (self.accuracy.gain * self.read) ** 2))
+            return np.asarray(np.sqrt(self.random**2 + self.local**2 + np.sum(self.shared**2, axis=0)))
+
+    @property
+    def freedom(self) -> Array:
+        """Effective degrees of freedom by Welch and Satterthwaite, infinite without scatter; GUM, G.4.1."""
+        with np.errstate(all="ignore"):
+            freedom = (self.count - 1) / (self.random**2 / self.total**2) ** 2
+        return np.where(np.isfinite(freedom), freedom, np.inf)
+
+    def expanded(self, coverage: float) -> Array:
+        """U = k_p u, with k_p of Student's distribution; GUM, G.3.2."""
+        return np.asarray(student(self.freedom, coverage) * self.total)
+
+    def at(self, where: NDArray[np.bool_]) -> Uncertainty:
+        """That of some of the positions."""
+        return Uncertainty(*(part[..., where] for part in vars(self).values()))
 
 
 @dataclass(frozen=True)

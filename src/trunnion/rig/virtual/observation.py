@@ -25,8 +25,17 @@ from trunnion.files import guard
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
-from trunnion.rig.virtual.rig_file import FORMATS, Rig, Value
-from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, pulses, readings, stream
+from trunnion.rig.virtual.rig_file import (
+    FORMATS,
+    Rig,
+    SensorChannel,
+    SensorErrors,
+    Value,
+    draw,
+    pulses,
+    readings,
+    stream,
+)  # fmt: skip
 from trunnion.solve.run import Run
 from trunnion.version import __version__
 
@@ -172,8 +181,7 @@ class Observation:
             }
             if encoder := self.rig.encoder:
                 angle, _ = case.drive(np.maximum(np.arange(case.rows) - case.before, 0))
-                count, part = pulses(angle, encoder.per_turn)
-                columns[encoder.column] = count if encoder.kind == "count" else (part < 0.5).astype(np.int64)
+                columns[encoder.column] = count = pulses(angle, encoder.per_turn)
                 if encoder.index:
                     columns[encoder.index] = (count % encoder.per_turn == 0).astype(np.int64)
             columns |= {self.channels[name].column: values for name, values in self._readings(case).items()}
@@ -342,8 +350,6 @@ def _angle(observation: Observation) -> dict[str, Any]:
     source: dict[str, Any]
     if encoder:
         source = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn, "kind": encoder.kind}
-        if encoder.kind == "level" and case.start[1] < 0:
-            source["sign"] = -1
         if zero := _zero(observation, case):
             source["zero"] = _degrees(zero)
         if encoder.index:
@@ -358,16 +364,13 @@ def _angle(observation: Observation) -> dict[str, Any]:
 
 
 def _zero(observation: Observation, case: Case) -> float:
-    """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
-    encoder, (start, speed) = observation.rig.encoder, case.start
-    if encoder is None or (encoder.kind == "count" and not encoder.index):
-        return 0.0
-    pitch = 2 * math.pi / encoder.per_turn
-    if encoder.index:
-        return 0.0 if speed > 0 else pitch  # backward, the first pulse is entered at its far end
-    # backward, the level rises in the middle of a pulse
-    count = start / pitch
-    return pitch * (math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5)
+    """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0.
+
+    Backward, the first pulse of a turn is entered at its far end.
+    """
+    encoder = observation.rig.encoder
+    backward = encoder is not None and encoder.index and case.start[1] < 0
+    return 2 * math.pi / encoder.per_turn if encoder is not None and backward else 0.0
 
 
 def _channel(observation: Observation, name: str) -> dict[str, Any]:

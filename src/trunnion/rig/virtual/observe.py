@@ -29,8 +29,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.rig.modelled import each, measure_of
 from trunnion.rig.virtual.observation import Case, Observation, check_seed, differ_in_speed
-from trunnion.rig.virtual.rig_file import Rig, Value
-from trunnion.rig.virtual.sensors import SensorChannel, resolved
+from trunnion.rig.virtual.rig_file import Rig, SensorChannel, Value, resolved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
@@ -233,20 +232,11 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
             yield Finding.warning("rig.no_answer", where, what, remedy)
     if not (sound := [case for case in cases if case.worst.solved]):
         return
-    driver, encoder, rate = sound[0].driver, rig.encoder, rig.rate.value
-    level = encoder is not None and encoder.kind == "level"
-    if encoder is not None and level:
-        peaks = [float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in sound]
-        if lost_pulses := [case for case, peak in zip(sound, peaks, strict=True)
-                           if 4 * encoder.per_turn * peak > rate * (1 + 1e-9)]:  # fmt: skip
-            what = f"{_which(lost_pulses)}: some encoder pulses are lost: up to {encoder.per_turn * max(peaks):.4g} "
-            remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
-            what += f"pulses per second, sampled at {rate:.4g} Hz"
-            yield Finding.warning("rig.pulses_lost", "encoder.kind", what, remedy)
-    if len({case.start[1] > 0 for case in sound if case.named}) > 1 and (encoder is None or level):
+    driver, encoder = sound[0].driver, rig.encoder
+    if encoder is None and len({case.start[1] > 0 for case in sound if case.named}) > 1:
         what = "the conditions turn in both directions, which only a count of pulses shows"
-        remedy = "state an encoder of kind: count, or one rig for each direction"
-        yield Finding.error("rig.both_ways", "encoder.kind" if level else "encoder", what, remedy)
+        remedy = "state an encoder, or one rig for each direction"
+        yield Finding.error("rig.both_ways", "encoder", what, remedy)
     if not encoder and differ_in_speed(sound):
         what = f"the conditions differ in speed, and nothing measures the angle of {driver}"
         yield Finding.error("rig.no_angle", "encoder", what, "state an encoder")

@@ -23,7 +23,7 @@ from benchmarks.drawn import planar, spatial
 from trunnion.cycle.course import course_of
 from trunnion.cycle.positions import stretch
 from trunnion.errors import MechanismError, Status
-from trunnion.results.figure import NUMERICAL
+from trunnion.results.attributes import NUMERICAL
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 

@@ -16,8 +16,8 @@ from trunnion.errors import Finding
 from trunnion.files import whole
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.units import TableUnits
+from trunnion.results.attributes import Figure as Figure
 from trunnion.results.attributes import findings_of, summary_of
-from trunnion.results.figure import Figure as Figure
 from trunnion.results.save import frame, save
 from trunnion.results.tables import KINDS, kind_of
 from trunnion.views.shown import figure_of, report_of, result_html

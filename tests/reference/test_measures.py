@@ -18,8 +18,7 @@ from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import plan
-from trunnion.results.attributes import summary_of
-from trunnion.results.figure import MORE_THAN
+from trunnion.results.attributes import MORE_THAN, summary_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run, prepare
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
-    from trunnion.results.result import Result
+    from trunnion.results.dataset import Result
     from trunnion.solve.friction_method import FrictionMethod
 
 __all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]

@@ -13,7 +13,7 @@ from trunnion.cli.options import IMAGES, Files, Model, placed
 from trunnion.cli.terminal import line, say, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.results.attributes import findings_of, summary_of
-from trunnion.results.result import Result
+from trunnion.results.dataset import Result
 
 if TYPE_CHECKING:
     import xarray as xr

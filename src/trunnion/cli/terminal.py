@@ -13,7 +13,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.results.quantities import parts
 
 if TYPE_CHECKING:
-    from trunnion.results.figure import Figure
+    from trunnion.results.attributes import Figure
 
 __all__ = ["bar", "console", "line", "say", "show_figures", "show_rows", "wrote"]
 

@@ -19,8 +19,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import TableUnits
 from trunnion.results import variables as results
 from trunnion.results.attributes import origin
-from trunnion.results.dataset import driven
-from trunnion.results.result import Result
+from trunnion.results.dataset import Result, driven
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 

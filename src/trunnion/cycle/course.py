@@ -24,7 +24,7 @@ from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_err
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
-from trunnion.results.figure import Figure
+from trunnion.results.attributes import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_ends
 from trunnion.solve.friction_method import FrictionMethod

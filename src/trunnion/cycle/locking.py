@@ -26,9 +26,8 @@ from trunnion.cycle.summary import member_units
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import attribute, codes, encoded, finding_rows
+from trunnion.results.attributes import Figure, attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import described, with_variables
-from trunnion.results.figure import Figure
 from trunnion.results.variables import LOCKING, along_positions
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work

@@ -22,7 +22,7 @@ from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Coded, Status
-from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.attributes import MORE_THAN, Figure
 from trunnion.results.quantities import readable
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, Given, backward

@@ -17,8 +17,8 @@ from trunnion.measures.figures import SIGNS
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import ends_by_name
+from trunnion.results.attributes import MORE_THAN, Figure
 from trunnion.results.dataset import MemberUnits, Variable, described
-from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of

@@ -24,10 +24,8 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import Dimension, si_unit
 from trunnion.results import variables as results
-from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, origin
-from trunnion.results.dataset import MemberUnits, driven
-from trunnion.results.figure import Figure
-from trunnion.results.result import Result
+from trunnion.results.attributes import KEPT, Figure, cited, encoded, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, Result, driven
 from trunnion.solve.contacts import bearing_ends, has_pressure
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.system import System, rubbing

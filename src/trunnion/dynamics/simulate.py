@@ -27,7 +27,7 @@ from trunnion.solve.run import prepare
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.results.result import Result
+    from trunnion.results.dataset import Result
 
 __all__ = ["simulate", "simulated"]
 

@@ -15,7 +15,7 @@ from trunnion.algebra.course import Courses
 from trunnion.algebra.panels import FIT, ON_POINTS, ORDER
 from trunnion.dynamics.solution import Solution, over_steps, step_nodes
 from trunnion.dynamics.state import FreeMotion
-from trunnion.results.figure import Figure
+from trunnion.results.attributes import Figure
 
 __all__ = ["FIGURES", "DriveCourse", "steady_figures"]
 

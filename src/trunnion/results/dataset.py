@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "TIME", "UNITS_OF_EACH", "Column", "MemberUnits", "Variable", "dataset_of", "described", "driven", "flat",
+    "TIME", "UNITS_OF_EACH", "Column", "MemberUnits", "Result", "Variable", "dataset_of", "described", "driven", "flat",
     "unit_of", "units_along", "with_variables",
 ]  # fmt: skip
 
@@ -203,3 +203,20 @@ def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> 
 def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> list[str]:
     units = (variable.attrs.get(UNITS_OF_EACH) for variable in variables.values())
     return list(dict.fromkeys(name for name in units if name is not None))
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a result says, and how its numbers become a Dataset.
+
+    Loading xarray takes as long as a small analysis: what prints a summary and findings alone reads `attrs`.
+    attrs: those of the Dataset, see `results.attributes`; build: makes the Dataset, called once.
+    """
+
+    attrs: Mapping[str, Any]
+    build: Callable[[], xr.Dataset]
+
+    @functools.cached_property
+    def dataset(self) -> xr.Dataset:
+        """The numbers with dimensions, units, labels and attributes."""
+        return self.build()

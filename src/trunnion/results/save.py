@@ -96,13 +96,8 @@ def _netcdf(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -
 
 def _zarr(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     path.unlink()  # a Zarr store is a folder
-    _uninterrupted(lambda: result.to_zarr(path, zarr_format=2))  # 3 has no stable text arrays yet
-
-
-def _uninterrupted(write: Callable[[], object]) -> None:
-    """Write to the end in a thread of its own: a signal raises in the main thread, and Zarr would go on behind it."""
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(write).result()
+    with ThreadPoolExecutor(1) as thread:  # to the end: a signal raises in the main thread, and Zarr would go on
+        thread.submit(lambda: result.to_zarr(path, zarr_format=2)).result()  # 3 has no stable text arrays yet
 
 
 def _json(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from trunnion.model.units import UnitError
 from trunnion.model.units import unit as unit_named
-from trunnion.results.attributes import Described, figure_rows
+from trunnion.results.attributes import Described, Figure, figure_rows
 from trunnion.results.dataset import UNITS_OF_EACH, unit_of
-from trunnion.results.figure import Figure
 
 if TYPE_CHECKING:
     import xarray as xr

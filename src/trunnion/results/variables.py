@@ -50,11 +50,6 @@ def _rest(
     return Variable(dims, unit, long_name, dtype, part, column=column, tables="rest")
 
 
-def _bearing(dims: Dims, unit: str, long_name: str, column: str) -> Variable:
-    """What only joints with ends, or with pins of a stated size, have."""
-    return Variable(dims, unit, long_name, part="bearings", column=column)
-
-
 def _seat(
     dims: Dims, unit: str, long_name: str, column: str | None = None, dtype: type[Any] = np.float64
 ) -> Variable:  # fmt: skip
@@ -62,7 +57,7 @@ def _seat(
     return Variable(dims, unit, long_name, dtype, "seats", column=column)
 
 
-def _error(dims: Dims, unit: str, long_name: str, column: str | None = None) -> Variable:
+def _error(dims: Dims, unit: str, long_name: str, column: str) -> Variable:
     """What only mechanisms with errors have."""
     return Variable(dims, unit, long_name, part="errors", column=column)
 
@@ -86,12 +81,13 @@ VARIABLES: dict[str, Variable] = {
     "reaction_force": Variable(JA, "N", "reaction on the second link by the first", column="reaction"),
     "reaction_moment": Variable(
         J, "N m", "reaction moment on the second link, about the joint's point", column="reaction_moment"),
-    "end_load": _bearing(
+    "end_load": Variable(
         ("joint", "bearing_end", "axis"), "N",
         "load on each end of the bearing or guide, global axes; of a cross 3 and 4 on the pin of the second link",
-        "end_load"),
-    "pin_pressure": _bearing(
-        J, "Pa", "load over projected area of the pin, F/(d b), in space of the end that bears more", "pin_pressure"),
+        part="bearings", column="end_load"),
+    "pin_pressure": Variable(
+        J, "Pa", "load over projected area of the pin, F/(d b), in space of the end that bears more", part="bearings",
+        column="pin_pressure"),
     "friction_torque": Variable(
         J, "N m", "friction torque on the second link by the first", column="friction_torque"),
     "friction_force": Variable(
@@ -224,10 +220,6 @@ def _vocabulary(space: str) -> dict[str, Variable]:
     return along_positions(variables(space))
 
 
-def _space(labels: Labels) -> str:
-    return "spatial" if "component" in labels else "planar"
-
-
 def dataset(
     arrays: dict[str, NDArray[np.float64]],
     labels: Labels,
@@ -247,7 +239,7 @@ def dataset(
     its variables at every position that it has, all if not given; dtype: of their floats. Where that is another than
     theirs, arrays are taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
-    vocabulary = _vocabulary(_space(labels))
+    vocabulary = _vocabulary("spatial" if "component" in labels else "planar")
     names = [name for name in arrays if names_kept is None or name in names_kept]
     other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
     numbers = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}

@@ -35,9 +35,8 @@ from trunnion.measures.positions import place_of
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.attributes import Figure, cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
-from trunnion.results.figure import Figure
 from trunnion.results.quantities import readable
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare

@@ -16,8 +16,7 @@ from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, outputs
 from trunnion.model.joint_parts import has_play
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import summary_of, units_of
-from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.attributes import MORE_THAN, Figure, summary_of, units_of
 from trunnion.results.quantities import quantity
 from trunnion.results.variables import VARIABLES
 from trunnion.solve.friction_method import MARGIN, FrictionMethod

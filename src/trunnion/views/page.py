@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import agreeing
 from trunnion.model.names import is_number
-from trunnion.results.attributes import attribute, summary_of, units_of
-from trunnion.results.figure import MORE_THAN
+from trunnion.results.attributes import MORE_THAN, attribute, summary_of, units_of
 from trunnion.results.quantities import quantity
 from trunnion.views.charts import Plot
 

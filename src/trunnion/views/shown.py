@@ -16,8 +16,7 @@ import xarray as xr
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.model.arguments import check_keywords, strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import findings_of, summary_of, whole
-from trunnion.results.figure import MORE_THAN
+from trunnion.results.attributes import MORE_THAN, findings_of, summary_of, whole
 from trunnion.results.quantities import readable
 from trunnion.results.tables import kind_of
 from trunnion.views.charts import Plot

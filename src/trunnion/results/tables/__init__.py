@@ -13,7 +13,7 @@ from trunnion.model.names import nearest
 from trunnion.model.units import unit
 from trunnion.results.attributes import attribute
 from trunnion.results.dataset import Column
-from trunnion.results.tables import cycle, studies, tolerances
+from trunnion.results.tables import cycle, studies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,8 +39,8 @@ KINDS: dict[str, Mapping[str, Callable[[Any], list[Column]]]] = {
     "measurement": {"courses": studies.courses},
     "comparison": studies.COMPARISON,
     "identification": studies.IDENTIFICATION,
-    "tolerance": tolerances.TABLES,
-    "allocation": {"parameters": tolerances.TABLES["parameters"], **tolerances.TABLES},
+    "tolerance": studies.TOLERANCE,
+    "allocation": {"parameters": studies.TOLERANCE["parameters"], **studies.TOLERANCE},
 }
 
 
@@ -87,14 +87,11 @@ def _inner(path: str | os.PathLike[str]) -> str:
 # ---- which columns a file gets --------------------------------------------------------------------------------
 
 
-def _everything(result: xr.Dataset) -> list[Column]:
-    return _once([*cycle.positions(result), *cycle.motion(result), *cycle.rest(result)])
-
-
 # of a cycle, beside the usual columns: coordinates, velocities and accelerations; margins, efficiency and effort
 # forward and backward; whatever there is at each position. Other kinds of results have but the usual ones
 OF_CYCLE: dict[str, Callable[[xr.Dataset], list[Column]]] = {
-    "motion": cycle.motion, "locking": cycle.locking, "all": _everything,
+    "motion": cycle.motion, "locking": cycle.locking,
+    "all": lambda result: _once([*cycle.positions(result), *cycle.motion(result), *cycle.rest(result)]),
 }  # fmt: skip
 GROUPS = ("usual", *OF_CYCLE)
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity
 from trunnion.model.tolerances import Price
-from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
+from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
-from trunnion.results.figure import Figure
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.scales import scales_in
 from trunnion.statistics.costs import Cost

@@ -22,7 +22,7 @@ from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.checks.check import check_values
-from trunnion.results.figure import Figure
+from trunnion.results.attributes import Figure
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.results.scales import extreme_place
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, limited

@@ -22,10 +22,9 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.errors import Status
-from trunnion.measures.angles import angles, near, within
+from trunnion.measures.curves import angles, near, within
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
-from trunnion.measures.figures import Panels, Read, Reading, combined
-from trunnion.measures.lines import turn
+from trunnion.measures.figures import Panels, Read, Reading, combined, turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import moved
 from trunnion.results.scales import ROUNDING, Scales
@@ -213,8 +212,18 @@ class Group:
         none = np.zeros(lanes_of(values), bool)
         if self.at_place or values is self.values or not self.bends:
             return None, none
-        bends, end = self._tracked(values), self.span[1]
-        times = np.array([bend.time for bend in self.bends])
+        run, end, times = self.run, self.span[1], np.array([bend.time for bend in self.bends])
+
+        def at(v: Values, time: Array) -> Number:
+            return moved(run, v, time)
+
+        plain = {path: primal(value) for path, value in values.items()}
+        of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * lanes_of(values))
+        bends: Number = tracked(of, self.bends, at)  # NaN where it is far off
+        if any(isinstance(value, Dual) for value in values.values()):
+            below, above, step = _sides(run, values, SHORT)
+            shifts = shifts_of(of, self.bends, bends, at, (below, above)) if np.any(step) else np.zeros_like(bends)
+            bends = Dual(bends, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
         lost = np.any(np.isnan(primal(bends)), axis=1)
         close = np.abs(primal(bends) - times) <= LOCATED * end  # so that the same mechanism has the same edges
         bends = bends + np.where(close, times - primal(bends), 0.0)
@@ -223,24 +232,6 @@ class Group:
             return None, lost
         bends = linear(bends, lambda array: np.where(lost[:, None], 0.0, array)) + np.where(lost[:, None], times, 0.0)
         return bends, lost
-
-    def _tracked(self, values: Values) -> Number:
-        """Times of the nominal mechanism, s, (lane, bend), at which each switches; NaN where it is far off."""
-        run, count = self.run, lanes_of(values)
-        plain = {path: primal(value) for path, value in values.items()}
-
-        def at(v: Values, time: Array) -> Number:
-            return moved(run, v, time)
-
-        of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * count)
-        times = tracked(of, self.bends, at)
-        if not any(isinstance(value, Dual) for value in values.values()):
-            return times
-        below, above, step = _sides(run, values, SHORT)
-        if not np.any(step):
-            return Dual(times, np.zeros_like(times))
-        shifts = shifts_of(of, self.bends, times, at, (below, above))
-        return Dual(times, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
 
     def _own_edges(self, bends: Number | None) -> Number:
         """Edges of the panels of each, (lane, edge), or (1, edge) if they are those of all: the nominal ones go along
@@ -391,19 +382,15 @@ class Group:
             numbers = [part - was for part, was in zip(numbers, before, strict=True)]
         return combined(lambda *arrays: np.stack(np.broadcast_arrays(*arrays)), *numbers)
 
-    def _fine(self, measure: Measure) -> float:
-        """Of the size of courses: how far figures may be off; a place is off by the root of that."""
-        if measure.wants_margin:
-            return 100.0 * MARGINS.tolerance
-        return FINE_MOTION if self.of_motion else FINE_PLACE if measure.of_place else FINE
-
     def _offending(self, measure: Measure, panels: Panels, rows: Array, share: float) -> Flags:
         """Panels that do not resolve the courses as far as the figure needs it, or whose numbers are infinite; of dual
         numbers those too that do not resolve the derivatives. Wide ones that hardly resolve them at all are parted
         wherever they are, as they may hide places without an answer."""
+        fine = FINE_MOTION if self.of_motion else FINE_PLACE if measure.of_place else FINE
+        fine = 100.0 * MARGINS.tolerance if measure.wants_margin else fine
         tails = panels.tails()
         sizes = np.maximum(self._sizes[measure.name], np.max(np.abs(rows), axis=(0, 2, 3)))[:, None]
-        excess = tails / np.where(sizes > 0.0, share * self._fine(measure) * sizes, np.inf)
+        excess = tails / np.where(sizes > 0.0, share * fine * sizes, np.inf)
         if isinstance(panels.coefficients, Dual):
             changes = np.abs(np.broadcast_to(panels.coefficients.dual, panels.coefficients.shape))
             most = np.max(changes, axis=(0, 2, 3))[:, None]

@@ -16,8 +16,7 @@ from pydantic import ValidationError
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.angles import angle_at, near
-from trunnion.measures.curves import AXES, CURVES, MOTIONS
+from trunnion.measures.curves import AXES, CURVES, MOTIONS, angle_at, near
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.expression import Expression
 from trunnion.model.joint_parts import motions
@@ -244,7 +243,15 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
                 at = f"--measure {name}"  # its keys, such as `point`, are not written there
                 findings += [replace(finding, where=at) for finding in check_measure(mechanism, entry, at)]
         if entry is None:
-            findings.append(Finding(f"'{name}' is no measure", "", _meant(name, mechanism), code="input.measure"))
+            head, colon, _ = name.partition(":")
+            links = mechanism.effective_links.items()
+            points = [f"{link}.{point}.{axis}" for link, item in links for point in item.points
+                      for axis in AXES[: mechanism.coordinates]]  # fmt: skip
+            remedy = nearest(head, [*STATISTICS, *MEASURES]) if colon else nearest(name, [*mechanism.measures, *points])
+            if not remedy.startswith("did you mean"):
+                remedy = f"write {FORMS}, with KIND and STATISTIC as in a model file"
+                remedy += f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
+            findings.append(Finding(f"'{name}' is no measure", "", remedy, code="input.measure"))
         elif entry.kind == "efficiency" and not has_useful_work(mechanism):
             what = f"the efficiency is undefined: {NOTHING_USEFUL}"
             findings.append(Finding(what, f"measures.{name}", STATE_USEFUL, code="input.measure"))
@@ -260,18 +267,6 @@ def chosen(mechanism: Mechanism, names: Sequence[str] | None, values: Values) ->
     if names is not None and not names:
         raise MechanismError(Finding("no measure is named", "measures", "name one, or leave measures out"))
     return named(mechanism, mechanism.measures if names is None else names, values)
-
-
-def _meant(name: str, mechanism: Mechanism) -> str:
-    """A remedy for a text that is no measure: what is most like it, else how one is written."""
-    head, colon, _ = name.partition(":")
-    points = (f"{link}.{point}" for link, entry in mechanism.effective_links.items() for point in entry.points)
-    components = [f"{point}.{axis}" for point in points for axis in AXES[: mechanism.coordinates]]
-    near = nearest(head, [*STATISTICS, *MEASURES]) if colon else nearest(name, [*mechanism.measures, *components])
-    if near.startswith("did you mean"):
-        return near
-    names_listed = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
-    return f"write {FORMS}, with KIND and STATISTIC as in a model file{names_listed}"
 
 
 def _read(text: str) -> Stated | None:

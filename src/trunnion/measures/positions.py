@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.measures.angles import within
+from trunnion.measures.curves import within
 from trunnion.measures.measures import Measure
 from trunnion.model.checks.units import in_radians
 from trunnion.model.measure_units import place_kind

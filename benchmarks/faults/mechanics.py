@@ -353,7 +353,7 @@ _MEASURES = (
     ),
     Fault(
         "straightness-angle-doubled",
-        "measures/lines.py",
+        "measures/figures.py",
         "angle = 0.5 * xp.arctan2(*twice)",
         "angle = 0.4 * xp.arctan2(*twice)",
         ("tests/reference/test_measures.py", "-k", "straightness"),
@@ -375,8 +375,8 @@ _MEASURES = (
     Fault(
         "breaks-stay-in-derivatives",
         "measures/group.py",
-        "return Dual(times, np.divide(shifts, 2 * step,",
-        "return Dual(times, 0.0 * np.divide(shifts, 2 * step,",
+        "bends = Dual(bends, np.divide(shifts, 2 * step,",
+        "bends = Dual(bends, 0.0 * np.divide(shifts, 2 * step,",
         ("tests/reference/test_loads_that_jump.py",),
     ),
     Fault(

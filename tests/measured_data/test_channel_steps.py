@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
-from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 
@@ -71,22 +70,6 @@ def test_an_angle_that_is_cut_off_does_not_speak_against_the_model(tmp_path: Pat
     assert result.attrs["all_within"]
     assert float(result["bias_expanded"].squeeze()) == pytest.approx(2 * np.radians(0.1) / np.sqrt(12), rel=0.05)
     assert abs(float(result["bias"].squeeze())) == pytest.approx(np.radians(0.05), rel=0.05)
-
-
-@pytest.mark.parametrize("stated", ["60 rpm", {"mean": "angle"}])
-def test_an_angle_that_counts_backwards(tmp_path: Path, stated: Any) -> None:
-    """It is told of the power, and refused beside the model, unless the model's speed is that of the angle."""
-    torque = {"M": {"column": "psi", "measures": "effort:A", "unit": "N m"}}
-    angle = {"from": "column", "column": "Winkel", "unit": "deg", "sign": -1}
-    changes = {"channels": torque, "angle": angle, "set": {"A.speed": stated}}
-    data = recorded(tmp_path, np.degrees(rocker(TURN)), 3, changes)
-    assert "data.power.sign" in {one.code for one in data.findings}
-    model = trunnion.Mechanism.model_validate(FOUR_BAR)
-    if stated == "60 rpm":
-        with pytest.raises(MechanismError, match="-60 rpm measured, 60 rpm stated of A"):
-            trunnion.rig.compare(model, data)
-    else:
-        assert "residual" in trunnion.rig.compare(model, data)
 
 
 def test_a_channel_has_one_step_of_all_its_files(tmp_path: Path) -> None:

@@ -45,14 +45,6 @@ def test_local_polynomials_are_those_of_scipy(count: int, width: int, order: int
     np.testing.assert_allclose(local_polynomials(values, width, order), theirs, rtol=0, atol=1e-11 * np.ptp(values))
 
 
-@pytest.mark.parametrize(("count", "width"), [(90, 31), (90_000, 40_001)])
-def test_local_cubics_leave_a_cubic_as_it_is(count: int, width: int) -> None:
-    """However many values there are: that of SciPy gives 0 from some 10⁴ on."""
-    x = np.linspace(-1, 1, count)
-    cubic = x**3 - 0.4 * x**2 + 2 * x + 0.7
-    assert local_polynomials(cubic, width, 3) == pytest.approx(cubic, abs=1e-11)
-
-
 @pytest.mark.parametrize("per_sample", [0.97, 1.01, 1.2, 1.5, 2.4])
 def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
     """A running count of 1.2 a sample steps by 1, 1, 1, 1, 2: the angle is right to a small part of a count."""

@@ -308,6 +308,7 @@ def test_a_channel_without_a_value_has_nothing_to_compare():
         ("maximum:effort:A", ("channels.torque.measures", "no number of a single position")),
         ("efficiency:cycle", ("channels.torque.measures", "no number of a single position")),
         ("stroke:D", ("channels.torque.measures", "no number of a single position")),
+        ("peak", ("channels.torque.measures", "no measure")),
         ("starting_time:A", ("channels.torque.measures",)),
         ("rotation:D", ("channels.torque", "is in N m, and rotation:D is in rad")),
     ],

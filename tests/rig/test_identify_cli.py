@@ -110,20 +110,6 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
     assert "http" not in page.replace("http-equiv", "")
 
 
-@pytest.mark.slow
-def test_numbers_that_are_not_told_apart_are_not_written(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
-    kind = "intervals"
-    pair = ",".join(f"{name}.friction.pair_factor" for name in ("input", "pin-1", "pin-2", "output"))
-    status, text = call("--parameter", f"mu={FRICTION}", "--parameter", f"pair={pair}", "--kind", kind, "--out",
-                        f"{kind}.png", "--write", "none.yaml")  # fmt: skip
-    assert status == 1
-    assert "not identifiable" in text
-    assert "are not separately identifiable" in text
-    assert "'none.yaml' is not written: no parameter is identifiable" in text
-    assert not (folder / "none.yaml").exists()
-    assert (folder / f"{kind}.png").stat().st_size > 10_000
-
-
 @pytest.mark.spread(7)
 @pytest.mark.parametrize(
     ("options", "message"),

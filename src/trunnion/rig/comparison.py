@@ -209,7 +209,16 @@ def _compared(
     powers = pairs_of(condition, joints)
     of_powers = {signal.channel: signal.measures for side in powers or () for pair in side for signal in pair}
     model = modelled(mechanism, condition, measured, method, of_powers)
-    without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
+
+    @cache
+    def frictionless() -> Mapping[str, Array]:
+        """Courses of the model without its friction; none where it has no friction, or has no answer without it."""
+        with suppress(MechanismError):
+            stated = in_condition(mechanism, condition)
+            if (free := stated.with_friction("off")).data() != stated.data():
+                return modelled(free, replace(condition, values={}, units={}), measured, method).courses
+        return {}
+
     figures: dict[str, dict[str, Any]] = {"": {"phase": condition.phase, "drive": model.drive, "status": model.status}}
     signals = {name: replace(condition.courses[name], local=model.left_open.get(name, 0.0)) for name in measured}
     drive = model.drive if model.unit == "rad" and len(model.drive) > 1 else None
@@ -219,7 +228,7 @@ def _compared(
         angle = np.nan_to_num(np.hypot(condition.lag * condition.speed, condition.cut) * slope)
         figures[name] = judge(signal, course, comparable, model.drive, coverage, angle)
         if figures[name]["verdict"] in (Verdict.NOT, Verdict.OFFSET):
-            free = None if model.measures[name].of_motion else without_friction().get(name)
+            free = None if model.measures[name].of_motion else frictionless().get(name)
             gap = np.where(comparable, figures[name]["residual"], np.nan)
             for kind, (size, share) in causes(gap, course, signal.accuracy.datum, drive, free).items():
                 figures[name] |= {f"{kind}_error": size, f"{kind}_explains": share}
@@ -262,18 +271,6 @@ def causes(
             size = float(along @ gap) / square
             explained[kind] = size, size**2 * square / total
     return explained
-
-
-def _frictionless(
-    mechanism: Mechanism, condition: Condition, channels: Mapping[str, str], method: FrictionMethod
-) -> Mapping[str, Array]:
-    """Courses of the model without its friction; none where it has no friction, or has no answer without it."""
-    model_stated = in_condition(mechanism, condition)
-    with suppress(MechanismError):
-        free = model_stated.with_friction("off")
-        if free.data() != model_stated.data():
-            return modelled(free, replace(condition, values={}, units={}), channels, method).courses
-    return {}
 
 
 def _efficiency(

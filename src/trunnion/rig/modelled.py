@@ -24,8 +24,7 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import sticking
 
 __all__ = [
-    "Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "refuse_unit", "same_cycle",
-    "turned",
+    "Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "same_cycle", "turned",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -73,8 +72,13 @@ class Modelled:
         return finite & (solved if np.any(solved) else self.status < Status.CONTACT_LOST)
 
 
-def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section: str = "channels") -> Measure:
-    """What a channel or a sensor measures; MechanismError if the model has no such course."""
+def measure_of(
+    mechanism: Mechanism, run: Run, channel: str, name: str, course: Signal | None = None, section: str = "channels"
+) -> Measure:
+    """What a channel or a sensor measures.
+
+    MechanismError if the model has no such course, or has it in another unit than the signal, such as N m for N.
+    """
     where = f"{section}.{channel}.measures"
     try:
         measure = named(mechanism, [name], run.values)[0]
@@ -84,14 +88,10 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section:
         what = f"'{name}' is no number of a single position, as a sensor shows it"
         remedy = "a sensor measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))
-    return measure
-
-
-def refuse_unit(run: Run, measure: Measure, channel: str, course: Signal) -> None:
-    """MechanismError where a channel has another unit than what it measures of the model, such as N in place of N m."""
-    if course.unit != (unit := measure.unit(run.system)):
+    if course is not None and course.unit != (unit := measure.unit(run.system)):
         what = f"is in {course.unit}, and {course.measures} is in {unit}"
         raise MechanismError(Finding(what, f"channels.{channel}", "name another column, or state unit and gain"))
+    return measure
 
 
 def modelled(
@@ -111,9 +111,8 @@ def modelled(
     measures: dict[str, Measure] = {}
     for channel, name in {**(also or {}), **channels}.items():
         try:
-            measure = measure_of(run.system.mechanism, run, channel, name)
-            refuse_unit(run, measure, channel, condition.courses[channel])
-            measures[channel] = measure
+            course = condition.courses[channel]
+            measures[channel] = measure_of(run.system.mechanism, run, channel, name, course)
         except MechanismError as error:
             findings += error.findings if channel in channels else ()
     if findings:
@@ -131,14 +130,14 @@ def modelled(
     same_cycle(run, condition, duration, float(first), float(last - first) if unit == "rad" else float("nan"))
     courses, left_open = {}, dict[str, Array]()
     for channel, measure in measures.items():
-        courses[channel] = course = _row(by_measure[measure.name][0], time)
-        measured = condition.courses[channel]
+        modelled_row = _row(by_measure[measure.name][0], time)
+        courses[channel], measured = modelled_row, condition.courses[channel]
         if measure.turning(run.system):  # both count their turns each in its own way
-            turns = np.round((measured.mean - course) / (2 * np.pi))
-            courses[channel] = course + 2 * np.pi * np.nan_to_num(turns)
+            turns = np.round((measured.mean - modelled_row) / (2 * np.pi))
+            courses[channel] = modelled_row + 2 * np.pi * np.nan_to_num(turns)
         elif measured.per_turn and run.cycle.periodic:
-            courses[channel] = over_pulses(course, phase, duration, measured.per_turn)
-            left_open[channel] = RIPPLE * np.abs(course - courses[channel])
+            courses[channel] = over_pulses(modelled_row, phase, duration, measured.per_turn)
+            left_open[channel] = RIPPLE * np.abs(modelled_row - courses[channel])
     moving = forward(run.system, run.values, run.chosen.assembly, time)
     sides = turned(run, moving, time.shape)
     return Modelled(run, drive, unit, float(last - first), status, sides, courses, measures, left_open)

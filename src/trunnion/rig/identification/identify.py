@@ -47,7 +47,7 @@ from trunnion.rig.identification.uncertainty import (
     quantile,
     spread_of,
 )  # fmt: skip
-from trunnion.rig.modelled import each, in_condition, measure_of, refuse_unit, same_cycle
+from trunnion.rig.modelled import each, in_condition, measure_of, same_cycle
 from trunnion.rig.reading.measurement import Condition, Measurement, rms
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -270,8 +270,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
     measures: dict[str, Measure] = {}
     for block in blocks:
         channel, text = block.channel, block.signal.measures
-        measure = measure_of(mechanism, run, channel, text)
-        refuse_unit(run, measure, channel, block.signal)
+        measure = measure_of(mechanism, run, channel, text, block.signal)
         if measures.setdefault(channel, measure).name != measure.name:
             what = f"measures {measures[channel].name} in one condition and {measure.name} in another"
             raise MechanismError(Finding(what, f"channel {channel}", "use separate channels"))
@@ -505,7 +504,7 @@ class _Identified:
         fit, conditions = self.fit, self.measurement.conditions
         driver, fitted = next(iter(self.mechanism.drivers), ""), {fit.blocks[k].condition for k in fit.fitted}
         rows = [*other_speed(driver, [(conditions[k], self.cycles[k].speed) for k in sorted(fitted)])]
-        rows += [*_of_fit(self), *_of_sensors(self), *_of_parameters(self)]
+        rows += [*_of_fit(self), *_of_unknowns(self)]
         return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))
 
 
@@ -557,8 +556,9 @@ def _of_fit(identified: _Identified) -> Iterator[Finding]:
         yield Finding.warning("fit.turns_alike", "data", what, remedy, correlation=spread.follows)
 
 
-def _of_sensors(identified: _Identified) -> Iterator[Finding]:
-    """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit."""
+def _of_unknowns(identified: _Identified) -> Iterator[Finding]:
+    """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit;
+    unknowns without an effect, that are not told apart, or that the data hardly determine."""
     fit = identified.fit
     stated = {fit.blocks[k].channel for k in fit.fitted for accuracy in [fit.blocks[k].signal.accuracy]
               if shared_zero(accuracy) or accuracy.gain}  # fmt: skip
@@ -575,18 +575,14 @@ def _of_sensors(identified: _Identified) -> Iterator[Finding]:
             remedy = "check the sensor, its unit, its stated accuracy, and lengths and loads of the model"
             where, severity = "angle.zero" if sensor.angle else sensor.name, (Severity.WARNING, Severity.ERROR)[excess]
             yield Finding.weighed(severity, "sensor.off", where, what, remedy, times=times, beyond=excess)
-
-
-def _of_parameters(identified: _Identified) -> Iterator[Finding]:
-    """Unknowns without an effect, that are not told apart, or that the data hardly determine."""
-    fit = identified.fit
-    channels = _joined(list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)))
     every = [*(unknown.name for unknown in fit.model.unknowns), *(f"the {error.name}" for error in fit.sensors)]
     for group in identified.groups:
         names = [every[i] for i in group]
-        what = f"{names[0]} is not identifiable: it has no effect on {channels}"
+        what = f"{names[0]} is not identifiable: it has no effect on {_joined([*channels])}"
         if len(names) > 1:
-            what = f"{_joined(names)} are not separately identifiable: they have the same effect on {channels}"
+            what = (
+                f"{_joined(names)} are not separately identifiable: they have the same effect on {_joined([*channels])}"
+            )
         remedy = "fix one or more, or measure a quantity that tells them"
         yield Finding.warning("parameter.not_told_apart", f"parameter {names[0]}", what, remedy, names=names)
     for p, unknown in enumerate(fit.model.unknowns) if not identified.refuted else ():

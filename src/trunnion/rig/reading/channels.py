@@ -269,23 +269,18 @@ def faults(where: str, readings: Array, turns: Turns, near: slice, moves: bool) 
         for kind, rows, check in (("stuck", running, _stuck), ("spikes", near, spikes)):
             mask = check(readings[rows])
             often = runs(mask)[0].size >= 0.5 * begin.size
-            if kind == "spikes":
-                mask[np.flatnonzero(mask)[_returning(seconds[rows][mask], begin, end)]] = False
+            if kind == "spikes" and mask.any():  # what another turn has in the same place is the signal's
+                time, place = seconds[rows][mask], np.flatnonzero(mask)
+                turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
+                phase = ((time - begin[turn]) / (end - begin)[turn]) % 1.0
+                order = np.argsort(phase)
+                after = np.roll(order, -1)
+                alike = ((phase[after] - phase[order]) % 1.0 < CHANCE / time.size) & (turn[after] != turn[order])
+                mask[place[order[alike]]] = mask[place[after[alike]]] = False
             if begin.size >= FEW and mask.any() and not often:
                 readings[rows][mask] = np.nan
                 what = lost(kind, mask, seconds[rows])
                 yield warning(f"readings.{kind}", where, what, "check sensor, shielding and logger")
-
-
-def _returning(time: Array, begin: Array, end: Array) -> Mask:
-    """What another turn has in the same place, as a peak narrower than the samples lie apart."""
-    turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
-    phase = ((time - begin[turn]) / (end - begin)[turn]) % 1.0
-    order, returns = np.argsort(phase), np.zeros(time.size, dtype=np.bool_)
-    after = np.roll(order, -1)
-    near = ((phase[after] - phase[order]) % 1.0 < CHANCE / max(time.size, 1)) & (turn[after] != turn[order])
-    returns[order[near]] = returns[after[near]] = True
-    return returns
 
 
 def _stuck(part: Array) -> Mask:

@@ -10,7 +10,7 @@ import importlib.util
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -40,7 +40,7 @@ from trunnion.solve.run import Run
 from trunnion.version import __version__
 
 __all__ = [
-    "MAPPING", "TRUTH", "Case", "Observation", "Record", "check_folder", "check_form", "check_seed", "differ_in_speed",
+    "MAPPING", "TRUTH", "Case", "Observation", "Record", "check_folder", "check_form", "check_seed",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -324,13 +324,6 @@ def check_seed(seed: int) -> None:
     """MechanismError for what seeds no random numbers."""
     if not 0 <= seed < MOST_SEEDS:
         raise MechanismError(Finding(f"the seed {seed} is no whole number from 0", "seed", "give one such as 1"))
-
-
-def differ_in_speed(cases: Sequence[Case]) -> bool:
-    """Whether the first driver runs one way and not as fast in all conditions."""
-    case, durations = cases[0], [case.cycle for case in cases]
-    one_way = case.run.system.span(case.run.values, case.driver).one_way
-    return bool(one_way) and max(durations) - min(durations) > 1e-9 * max(durations)
 
 
 # ---- the mapping ----------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.rig.modelled import each, measure_of
-from trunnion.rig.virtual.observation import Case, Observation, check_seed, differ_in_speed
+from trunnion.rig.virtual.observation import Case, Observation, check_seed
 from trunnion.rig.virtual.rig_file import Rig, SensorChannel, Value, resolved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -113,7 +113,7 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
 def _measures(rig: Rig, run: Run) -> list[Measure]:
     """What each sensor measures; MechanismError with all that the model has no course of."""
     mechanism, sensors = run.system.mechanism, rig.sensors.items()
-    measures = each(sensors, lambda item: measure_of(mechanism, run, item[0], item[1].measures, "sensors"))
+    measures = each(sensors, lambda item: measure_of(mechanism, run, item[0], item[1].measures, section="sensors"))
     if run.determinacy is not None and not all(measure.of_motion for measure in measures):
         run.determinacy.refuse()
     return measures
@@ -237,7 +237,8 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
         what = "the conditions turn in both directions, which only a count of pulses shows"
         remedy = "state an encoder, or one rig for each direction"
         yield Finding.error("rig.both_ways", "encoder", what, remedy)
-    if not encoder and differ_in_speed(sound):
+    durations, one_way = [case.cycle for case in sound], sound[0].run.system.span(sound[0].run.values, driver).one_way
+    if not encoder and one_way and max(durations) - min(durations) > 1e-9 * max(durations):
         what = f"the conditions differ in speed, and nothing measures the angle of {driver}"
         yield Finding.error("rig.no_angle", "encoder", what, "state an encoder")
     for i, (name, channel) in enumerate(channels.items()):

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -135,19 +134,12 @@ def _truncated_moments(lower: float, upper: float, options: Options) -> tuple[fl
     peak = min(b, 0.0)
     reach = math.sqrt(peak * peak + 80)
     start, end = max(a, -reach), min(b, reach)
-    nodes, weights = _gauss(120)
+    nodes, weights = np.polynomial.legendre.leggauss(120)
     z = (start + end) / 2 + (end - start) / 2 * nodes
     weights = weights * np.exp((peak - z) * (peak + z) / 2)
     weights /= weights.sum()
     middle = float(weights @ z)
     return mean + sign * sigma * middle, sigma * sigma * float(weights @ (z - middle) ** 2)
-
-
-@lru_cache(maxsize=1)
-def _gauss(number: int) -> tuple[Floats, Floats]:
-    """Nodes and weights of Gauss-Legendre quadrature on −1 ... 1."""
-    nodes, weights = np.polynomial.legendre.leggauss(number)
-    return nodes, weights
 
 
 # ---- beta -----------------------------------------------------------------------------------------------------

@@ -13,16 +13,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 __all__ = [
-    "Moments",
-    "by_replicates",
-    "capability",
-    "moments_of",
-    "of_deviation",
-    "of_mean",
-    "of_quantile",
-    "share",
+    "Moments", "by_replicates", "capability", "moments_of", "of_deviation", "of_mean", "of_quantile", "share",
     "share_by_replicates",
-]
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Interval = tuple[Floats, Floats]

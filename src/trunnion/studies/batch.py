@@ -279,12 +279,6 @@ def settings(job: Job) -> dict[str, Any]:
     identity = {"version": __version__, **job.identity()}
     for key, value in identity.items():
         if not isinstance(value, single):
-            text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
+            text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=lambda array: array.tolist())
             identity[key] = hashlib.sha256(text.encode()).hexdigest()[:12]
     return identity
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    raise TypeError(f"{value!r} in the identity of a job has no JSON")

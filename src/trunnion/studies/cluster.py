@@ -38,7 +38,15 @@ def connected(address: str) -> Iterator[tuple[Executor, int]]:
     for logger in loggers:  # nothing of Dask's on the terminal: what matters comes back as an exception
         logger.setLevel(logging.CRITICAL + 1)
     try:
-        with _client(address) as client:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the versions that matter are compared here, ports are no matter
+            try:
+                client: Client = Client(address, timeout=CONNECT, set_as_default=False)
+                client.wait_for_workers(1, timeout=ARRIVE)
+            except (OSError, ValueError, TimeoutError) as error:
+                what = f"no Dask scheduler with workers answers at {address} ({error})"
+                raise MechanismError(Finding(what, "cluster", START)) from None
+        with client:
             if any(versions != _versions() for versions in client.run(_versions).values()):
                 what = f"a worker of the cluster has other versions than here: {_versions()}"
                 raise MechanismError(Finding(what, "cluster", "install the same on all machines"))
@@ -58,19 +66,6 @@ def connected(address: str) -> Iterator[tuple[Executor, int]]:
     finally:
         for logger, level in zip(loggers, before, strict=True):
             logger.setLevel(level)
-
-
-def _client(address: str) -> Client:
-    """A client of the scheduler at an address, which has a worker."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the versions that matter are compared here, ports are no matter
-        try:
-            client: Client = Client(address, timeout=CONNECT, set_as_default=False)
-            client.wait_for_workers(1, timeout=ARRIVE)
-        except (OSError, ValueError, TimeoutError) as error:
-            what = f"no Dask scheduler with workers answers at {address} ({error})"
-            raise MechanismError(Finding(what, "cluster", START)) from None
-    return client
 
 
 def _versions() -> dict[str, str]:

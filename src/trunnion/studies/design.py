@@ -34,20 +34,9 @@ from trunnion.solve.status import pose_status
 from trunnion.solve.switches import Mechanisms, knots_of
 
 __all__ = [
-    "Centre",
-    "Counterweight",
-    "Design",
-    "Extremes",
-    "counterweights",
-    "dead_centres",
-    "design",
-    "grashof",
-    "instant_centres",
-    "pressure_angles",
-    "report_figures",
-    "shaking",
-    "transmission_angles",
-]
+    "Centre", "Counterweight", "Design", "Extremes", "counterweights", "dead_centres", "design", "grashof",
+    "instant_centres", "pressure_angles", "report_figures", "shaking", "transmission_angles",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -74,16 +63,6 @@ class Extremes(NamedTuple):
     at_least: float
     largest: float
     at_largest: float
-
-
-class Motor(NamedTuple):
-    """Of one driver over a cycle: RMS of its effort, N m or N; largest magnitude and mean of its power, W; largest
-    change of its energy about the mean, J. NaN where positions have no answer."""
-
-    rms_effort: float = 0.0
-    peak_power: float = 0.0
-    mean_power: float = 0.0
-    energy_swing: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -155,7 +134,7 @@ def design(mechanism: Mechanism) -> Design:
     return Design(
         grashof(mechanism, run), {name: np.pi / 2 - angle for name, angle in largest.items()},
         extremes, dead_centres(run), limits(run),
-        force, moment, *(motor(run, driver) if driver else Motor()), motion.mean_speed() if driver else 0.0,
+        force, moment, *(motor(run, driver) if driver else (0.0,) * 4), motion.mean_speed() if driver else 0.0,
     )  # fmt: skip
 
 
@@ -380,8 +359,9 @@ def _numbers(walk: Forward, time: Array) -> dict[tuple[str, str], Number]:
     return numbers
 
 
-def motor(run: Run, driver: str) -> Motor:
-    """Figures of a driver."""
+def motor(run: Run, driver: str) -> tuple[float, float, float, float]:
+    """Of a driver the RMS of its effort, N m or N; the largest magnitude and the mean of its power, W; the largest
+    change of its energy about the mean, J. NaN where positions have no answer."""
     i = list(run.system.mechanism.drivers).index(driver)
     course = course_of(run, FrictionMethod(), names=("drive_effort", "drive_power"))
     power, peak = course.picked("drive_power", i), course.extreme("drive_power", i, of=magnitude)
@@ -392,7 +372,7 @@ def motor(run: Run, driver: str) -> Motor:
     # the energy is level where the power is the mean, or at an edge
     cut = power.parted(power.passages(0, mean))
     energy = np.cumsum(np.append(0.0, cut.half * (cut.coefficients[:, 0] @ INTEGRAL - 2.0 * mean)))
-    return Motor(float(np.sqrt(square)), 0.0 if peak is None else peak.value, mean, float(np.ptp(energy)))
+    return float(np.sqrt(square)), 0.0 if peak is None else peak.value, mean, float(np.ptp(energy))
 
 
 def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:

@@ -27,13 +27,8 @@ from trunnion.results.quantities import drawn_in, signed
 from trunnion.statistics.costs import Cost
 
 __all__ = [
-    "AllocationProblem",
-    "Answer",
-    "Contribution",
-    "Criterion",
-    "RowEffects",
-    "SampledYield",
-]
+    "AllocationProblem", "Answer", "Contribution", "Criterion", "RowEffects", "SampledYield",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
@@ -242,13 +237,14 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
         upwards = high[row] - effects.upper[row] >= effects.lower[row] - low[row]
         over, limit = (high[row], effects.upper[row]) if upwards else (low[row], effects.lower[row])
         largest = problem.contributions[int(np.argmax((effects.linear + np.abs(effects.spread))[row] * least))]
-        narrow = f"narrow '{largest.name}', which has no cost and" * largest.fixed
-        narrow = narrow or f"allow '{largest.name}' a smaller least: it"
         what = f"the limit {say(row, limit)} is infeasible: with all tolerances at their least the deviation "
         what += f"is {say(row, over)}{places[row]}"
         if problem.caps is not None:
             what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
-        remedy, figures = f"widen the limit, or first {narrow} has the largest share", {"limit": limit, "takes": over}
+        remedy, figures = (
+            f"widen the limit, or narrow first '{largest.name}', the largest share",
+            {"limit": limit, "takes": over},
+        )
         where = label or f"row {row + 1}"
-        findings.append(Finding.error("allocation.impossible", where, what, remedy, **figures, largest=largest.name))
+        findings.append(Finding.error("allocation.impossible", where, what, remedy, **figures))
     return findings

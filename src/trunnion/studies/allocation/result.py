@@ -24,13 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "CLOSE",
-    "DEFAULT_YIELD",
-    "VARIABLES",
-    "Allocated",
-    "dataset",
-    "share_of",
-]
+    "CLOSE", "DEFAULT_YIELD", "VARIABLES", "Allocated", "dataset", "share_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 DEFAULT_YIELD = 0.9973

@@ -99,23 +99,15 @@ def test_nested_duals_give_second_derivatives(name: str) -> None:
     p, q = "links.crank.points.B.x", "joints.B.friction.coefficient"
     vp, vq = run.values[p], run.values[q]
 
-    def first(shift: float) -> dict[str, Array]:
-        values = run.system.mechanism.parameters({p: Dual(vp + shift, 1.0), q: vq})
+    def first(shift: Array) -> dict[str, Array]:
+        values = run.system.mechanism.parameters({p: Dual(vp + shift[0], 1.0), q: vq + shift[1]})
         return {key: derivative(number) for key, number in outputs(run.solve(time, values, METHOD))}
 
-    for other, value in ((p, vp), (q, vq)):
-        inner = {p: Dual(Dual(vp, 1.0), Dual(1.0, 0.0))} if other == p else {p: Dual(vp, 0.0)}
-        if other == q:
-            inner = {p: Dual(Dual(vp, 0.0), Dual(1.0, 0.0)), q: Dual(Dual(vq, 1.0), Dual(0.0, 0.0))}
+    for other, value, seed in ((p, vp, np.array([1.0, 0.0])), (q, vq, np.array([0.0, 1.0]))):
+        inner = {p: Dual(Dual(vp, seed[0]), Dual(1.0, 0.0)), q: Dual(Dual(vq, seed[1]), Dual(0.0, 0.0))}
         nested = run.solve(time, run.system.mechanism.parameters(inner), METHOD)
         h = 1e-3 * value
-        if other == p:
-            lows = [first(k * h) for k in (-2, -1, 1, 2)]
-        else:
-            lows = []
-            for k in (-2, -1, 1, 2):
-                values = run.system.mechanism.parameters({p: Dual(vp, 1.0), q: vq + k * h})
-                lows.append({key: derivative(n) for key, n in outputs(run.solve(time, values, METHOD))})
+        lows = [first(k * h * seed) for k in (-2, -1, 1, 2)]
         for output, number in outputs(nested):
             if not isinstance(number, Dual):
                 continue

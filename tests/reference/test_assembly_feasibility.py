@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import trunnion
-from mechanisms import Data
+from mechanisms_parts import Data, joined
 from trunnion.studies.assembly import AssemblyStatus
 
 Array = NDArray[np.float64]
@@ -26,11 +26,10 @@ OPEN = 1e-12
 def hinges(apart: float, pin: float, second: Data, kind: str = "revolute") -> trunnion.Mechanism:
     """A leaf on two coaxial hinges."""
     points = {"A": {"at": [0, 0, 0], **UPRIGHT}, "B": {"at": [0, 0, apart], **UPRIGHT}}
-    joints = {"A": {"type": "revolute"}, "B": {"type": kind, **second}}
     return trunnion.Mechanism(
         space="spatial",
         links={"frame": {"points": points}, "leaf": {"points": points}},
-        joints={name: {**joint, "links": ["frame", "leaf"]} for name, joint in joints.items()},
+        joints=joined(f"frame -A- leaf, frame -B:{kind}- leaf", B=second),
         joint_defaults={"pin": {"radius": 0.005, "length": pin}},
         ground="frame",
         drivers={"A": {"speed": 1.0}},
@@ -41,15 +40,10 @@ def four_bar(errors: Data, pins: Data | None = None) -> Data:
     """A planar four-bar drawn in space, pins upright; errors and pins by joint."""
     ground, crank, coupler, rocker = ({"at": [length, 0, 0], **UPRIGHT} for length in LENGTHS)
     here = {"at": [0, 0, 0], **UPRIGHT}
-    links = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
-    joints = {
-        name: {
-            "type": "revolute",
-            "links": pair,
-            **({"misalignment": errors[name]} if name in errors else {}),
-            "pin": {"length": PIN, **(pins or {}).get(name, {})},
-        }
-        for name, pair in links.items()
+    parts = {
+        name: {"pin": {"length": PIN, **(pins or {}).get(name, {})}}
+        | ({"misalignment": errors[name]} if name in errors else {})
+        for name in "ABCD"
     }
     return {
         "space": "spatial",
@@ -59,7 +53,7 @@ def four_bar(errors: Data, pins: Data | None = None) -> Data:
             "coupler": {"points": {"B": here, "C": coupler}},
             "rocker": {"points": {"D": here, "C": rocker}},
         },
-        "joints": joints,
+        "joints": joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker", **parts),
         "joint_defaults": {"pin": {"radius": 0.005}},
         "drivers": {"A": {"speed": 1.0}},
         "assembly": {"C": [0.03, 0.07, 0]},

@@ -10,8 +10,16 @@ import pytest
 
 import trunnion
 from brief import brief
-from geared import geared_five_bar, geared_loop, planet_drive, rocker_train, screwed_strut
-from mechanisms import Data, analyse, positions_of
+from mechanisms import (
+    Data,
+    analyse,
+    geared_five_bar,
+    geared_loop,
+    planet_drive,
+    positions_of,
+    rocker_train,
+    screwed_strut,
+)
 from mechanisms_parts import joined, slide
 from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare

@@ -75,7 +75,7 @@ def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> 
 @pytest.mark.parametrize(("first", "last", "told"), [(0.2, 1.4, "end"), (1.4, 1.8, "all"), (0.2, 2.5, "")])
 def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: float, last: float, told: str) -> None:
     """Of a hoist that stops where it holds; of one that holds all along; of one that its load drives on at the end."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data: Data = hoist().data()
     data["drivers"]["A"]["range"] = [first, last]
     run = prepare(Mechanism(**data))
     rows = {one.name: one for one in report_figures(run) if one.name.startswith("holding")}
@@ -100,7 +100,7 @@ def expected_states(arm: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("steps", [5, 181])
 def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps: int) -> None:
     """The load has no power there, and no range of its own."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data: Data = hoist().data()
     data["drivers"]["A"]["range"] = [0.0, np.pi]
     found = locking(Mechanism(**data), steps)
     assert states(found)[steps // 2] == LockingState.SELF_LOCKING_FORWARD
@@ -125,7 +125,7 @@ def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
 
 def spring_hoist(**spring: object) -> Mechanism:
     """The crank of the hoist, pulled by a spring below its pin instead of the weight."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data: Data = hoist().data()
     data["links"]["ground"]["points"]["Q"] = [0, -0.1]
     data |= {"loads": {}, "springs": {"s": {"between": ["ground.Q", "crank.P"], **spring}}}
     return Mechanism(**data)
@@ -190,7 +190,7 @@ def test_ranges_cover_the_cycle_once_and_near_ones_are_below_the_margin() -> Non
 
 def test_what_masses_hold_is_no_self_locking() -> None:
     """A four-bar without friction whose links take more power than the load gives: no friction holds it."""
-    data = trunnion.read(EXAMPLES / "durango-fourbar.yaml").model_dump(by_alias=True, exclude_unset=True)
+    data = trunnion.read(EXAMPLES / "durango-fourbar.yaml").data()
     data["drivers"]["A"]["range"] = [0.0, 0.08]
     mechanism = trunnion.Mechanism(**data).with_friction("off")
     found = {one.name: one for one in report_figures(prepare(mechanism))}

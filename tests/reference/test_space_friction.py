@@ -12,6 +12,7 @@ import xarray as xr
 import trunnion
 from brief import brief
 from mechanisms import MODELS, build, model
+from mechanisms_parts import joined
 from mechanisms_space import cardan, rssr
 from reference.maximal_space import Data, raised
 from reference.test_space_values import loop
@@ -85,17 +86,15 @@ LEAD = np.arctan(PITCH / (2 * np.pi * MEAN))
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_screw_jack(friction: float, way: float) -> None:
     """Torque F r tan(λ ± φ) to raise and to lower; a thread with φ > λ has to be driven down."""
+    axis = {"at": [0, 0, 0], "axis": [0, 0, 1]}
+    thread = {"pitch": PITCH, "friction": friction, "pin": {"radius": MEAN, "bearing": 0.1}}
     data = {
         "space": "spatial",
-        "links": {
-            "ground": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}},
-            "screw": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}, "top": [0, 0, 0.2]}},
-        },
-        "joints": {"A": {"type": "helical", "links": ["ground", "screw"], "pitch": PITCH, "friction": friction,
-                         "pin": {"radius": MEAN, "bearing": 0.1}}},
+        "links": {"ground": {"points": {"A": axis}}, "screw": {"points": {"A": axis, "top": [0, 0, 0.2]}}},
+        "joints": joined("ground -A:helical- screw", A=thread),
         "drivers": {"A": {"speed": way, "range": [0.0, 9.0][:: int(way)]}},
         "loads": {"weight": {"link": "screw", "at": "top", "force": [0, 0, -LOAD], "useful": True}},
-    }  # fmt: skip
+    }
     result = analysed(data, 5)
     phi = np.arctan(friction)
     np.testing.assert_allclose(result.drive_effort.values, LOAD * MEAN * np.tan(LEAD + way * phi), rtol=1e-12)

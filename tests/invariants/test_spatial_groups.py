@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from brief import brief
 from trunnion import Mechanism
-from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
-from trunnion.algebra.space import ORIGIN, Frame, Screw, compose, element, relative
+from trunnion.algebra.space import Frame, Screw, compose, element, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, Element, GroupJoint, Pose
@@ -95,68 +94,7 @@ def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, load
     return numbers((pose.frames, tuple(twists), tuple(seconds), tuple(group.reactions(pose, loads))))
 
 
-# the general group
-# one loop each of mobility one, driven at its first joint: kinds, and where the links' elements lie
-LOOPS = {
-    "RSSR": ("revolute", "spherical", "spherical", "revolute"),
-    "RSSP": ("revolute", "spherical", "spherical", "prismatic"),
-    "RCCC": ("revolute", "cylindrical", "cylindrical", "cylindrical"),
-    "RRRC U": ("revolute", "revolute", "universal", "revolute", "cylindrical"),
-    "RHCRR R": ("revolute", "helical", "cylindrical", "revolute", "revolute", "revolute"),
-    "RRERR": ("revolute", "revolute", "planar", "revolute", "revolute"),
-    "7R": ("revolute",) * 7,
-    "PUSR": ("prismatic", "universal", "spherical", "revolute"),
-}
-
-
-def loop(kinds: tuple[str, ...]) -> tuple[SpatialGroup, list[Element], list[Any], float]:
-    """A loop that closes for coordinates drawn at random: group, elements, coordinates to start from, drive."""
-    rng = np.random.default_rng(sum(map(len, kinds)) + len(kinds))
-    q = [list(rng.uniform(-1, 1, len(MOTIONS[kind].kinds))) for kind in kinds]
-    place, locals_ = ORIGIN, []
-    for kind, coordinates in zip(kinds, q, strict=True):
-        first = random_frame(rng, reach=0.5)
-        second = random_frame(rng, reach=0.5)
-        locals_.append((first, second))
-        place = relative(MOTIONS[kind].place(compose(place, first), coordinates, LEAD), second)
-    # the last link is the ground again: the last joint's element on it is where it has got to
-    last = compose(place, locals_[-1][1])
-    sides = [(k - 1 if k else OUTER, k if k < len(kinds) - 1 else OUTER) for k in range(len(kinds))]
-    joints = tuple(GroupJoint(kind, pair) for kind, pair in zip(kinds, sides, strict=True))
-    elements = [Element(a, b, LEAD) for a, b in locals_]
-    elements[-1] = elements[-1]._replace(second=last)
-    spinning = tuple((k, k, k + 1) for k in range(len(kinds) - 1) if kinds[k] == kinds[k + 1] == "spherical")
-    group = SpatialGroup(len(kinds) - 1, joints, (0,), spinning)
-    flat_q = [value for joint in q for value in joint]
-    start = [np.array(flat_q[i]) for i in group.kept]
-    return group, elements, start, float(q[0][0])
-
-
-@pytest.mark.parametrize("kinds", LOOPS.values(), ids=LOOPS)
-def test_dual_parts_are_derivatives_by_a_dimension(kinds: tuple[str, ...]) -> None:
-    group, elements, start, drive = loop(kinds)
-
-    def outcome(change: Any) -> Any:
-        first = elements[1].first
-        x, y, z = first.place
-        moved = [elements[0], elements[1]._replace(first=first._replace(place=(x + change, y, z))), *elements[2:]]
-        pose = group.position(moved, start, [drive])
-        loads = [Screw((1.0, 2.0, -1.0), (0.3, 0.1, 0.2))] * group.links
-        return pose.elements, tuple(group.reactions(pose, loads))
-
-    spun = bool(group.spinning)  # their frames depend on the way there, their joints do not
-    h = 1e-6
-
-    def chosen(value: Any) -> list[Any]:
-        elements_, reactions = value
-        return [*(n for one in elements_ for n in one.second.place), *(() if spun else flat(reactions))]
-
-    exact = [derivative(n) for n in chosen(outcome(seed(0.0)))]
-    ends = [np.array([float(n) for n in chosen(outcome(sign * h))]) for sign in (1.0, -1.0)]
-    differences = (ends[0] - ends[1]) / (2 * h)
-    assert np.allclose(np.array(exact, float), differences, rtol=1e-6, atol=1e-6 * np.max(np.abs(differences)))
-
-
+# a link between two balls
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("reversed_", [False, True])
 def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_: bool) -> None:

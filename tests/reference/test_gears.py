@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from brief import brief
+from brief import brief, judged
 from mechanisms import (
     Data,
     analyse,
@@ -110,13 +110,13 @@ def steering(driver: Data, gear: Data | None = None) -> Data:
     return {
         "gravity": [0, 0],
         "links": {
-            "frame": {"points": {"P": [0, RADIUS], "S": slide(0, 0), "K": [0.6, 0.15]}},
+            "ground": {"points": {"P": [0, RADIUS], "S": slide(0, 0), "K": [0.6, 0.15]}},
             "pinion": {"points": {"P": [0, 0]}},
             "rack": {"points": {"S": slide(0, 0), "T": [0.3, 0]}},
             "rod": {"points": {"T": [0, 0], "A": [0.285, 0]}},
             "knuckle": {"points": {"K": [0, 0], "A": [-0.02, -0.14]}},
         },
-        "joints": joined("frame -P- pinion, frame =S= rack -T- rod -A- knuckle, frame -K- knuckle"),
+        "joints": joined("ground -P- pinion, ground =S= rack -T- rod -A- knuckle, ground -K- knuckle"),
         "gears": {"mesh": {"joints": ["P", "S"], "radius": RADIUS, **(gear or {})}},
         "drivers": driver,
         "loads": {"tyre": {"joint": "K", "resisting_torque": TORQUE}},
@@ -141,9 +141,10 @@ def knuckle_by_hand(rack: Any) -> Any:
 
 @pytest.mark.parametrize(("order", "angle"), [(("P", "S"), 20.0), (("S", "P"), 14.5)])
 def test_rack_steering(order: tuple[str, str], angle: float) -> None:
-    """Torque · ω = tyre torque · ω of the knuckle, by differences of the geometry; a tooth presses with F/cos α."""
+    """Torque · ω = tyre torque · ω of the knuckle, by differences of the geometry; all forces are right."""
     gear = {"joints": list(order), "pressure_angle": np.radians(angle), "phase": 0.001}
-    result = brief(Mechanism(**steering({"P": {"speed": 2.0, "range": [-5.0, 5.0]}}, gear)), 11)
+    data = steering({"P": {"speed": 2.0, "range": [-5.0, 5.0]}}, gear)
+    result = brief(Mechanism(**data), 11)
     rack = RADIUS * np.linspace(-5.0, 5.0, 11) + 0.001
     np.testing.assert_allclose(at(result, "joint_slide", joint="S"), rack, atol=1e-15)
     h = 1e-4
@@ -151,23 +152,15 @@ def test_rack_steering(order: tuple[str, str], angle: float) -> None:
             - (knuckle_by_hand(rack + 2 * h) - knuckle_by_hand(rack - 2 * h))) / (12 * h)  # fmt: skip
     force = TORQUE * np.abs(rate)  # along the rack, by virtual work
     np.testing.assert_allclose(at(result, "drive_effort", driver="P"), force * RADIUS, rtol=1e-9)
-    np.testing.assert_allclose(at(result, "gear_torque", gear="mesh"), -force * RADIUS, rtol=1e-9)
-    tilt = np.tan(np.radians(angle))
-    np.testing.assert_allclose(at(result, "gear_force", "x", gear="mesh"), force, rtol=1e-9)
-    # the flanks push the rack down, away from the pinion, and the pinion up
-    np.testing.assert_allclose(at(result, "gear_force", "y", gear="mesh"), -force * tilt, rtol=1e-9, atol=1e-9)
-    reaction = np.hypot(*(at(result, "reaction_force", axis, joint="P") for axis in "xy"))
-    np.testing.assert_allclose(reaction, force / np.cos(np.radians(angle)), rtol=1e-9)
-    rod = at(result, "reaction_force", "y", joint="T")  # on the rod by the rack
-    np.testing.assert_allclose(at(result, "reaction_force", "y", joint="S"), force * tilt + rod, rtol=1e-9, atol=1e-6)
+    judged(data, result)
 
 
 def wheel_and_rack(driver: Data) -> Data:
     data = steering(driver)
     data["loads"] = {"wind": {"joint": "P", "resisting_torque": 3.0}}
-    data["links"] = {name: data["links"][name] for name in ("frame", "pinion", "rack")}
+    data["links"] = {name: data["links"][name] for name in ("ground", "pinion", "rack")}
     data["joints"] = {name: data["joints"][name] for name in ("P", "S")}
-    data["links"]["frame"]["points"].pop("K")
+    data["links"]["ground"]["points"].pop("K")
     data["assembly"] = {}
     return data
 

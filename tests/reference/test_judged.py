@@ -16,10 +16,8 @@ from benchmarks.judged.verdict import CHECKS, Results
 from benchmarks.random_mechanisms import examine, result_of
 
 import mechanisms_space
-from brief import brief
-from mechanisms import MODELS, Data, model
-from reference.maximal_space import unrolled
-from reference.space_oracle import merged
+from brief import brief, judged
+from mechanisms import MODELS, model
 from trunnion import Mechanism, Status
 
 STEPS = 24
@@ -60,22 +58,13 @@ def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
             np.testing.assert_array_equal(array, whole.arrays[name], err_msg=name)
 
 
-def is_right(judge: Any, data: Data, steps: int) -> Any:
-    """The result, of which every solved position keeps every limit."""
-    result = brief(Mechanism(**data), steps)
-    plain = unrolled(data)
-    verdict = judge({**plain, "joints": {name: merged(plain, name) for name in plain["joints"]}}, Results(result))
-    for check, limit in CHECKS.items():
-        assert verdict.worst(check)[0] <= limit, verdict.worst(check)
-    assert np.count_nonzero(result["status"] == Status.SOLVED) > steps - 4
-    return result
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.15])
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "screwed strut"])
 def test_every_mechanism_of_the_tests_is_right(name: str, friction: float) -> None:
-    """Motion by closure and drivers, balance of every link, friction by its law, tooth forces, power."""
-    result = is_right(judged_planar.judge, model(MODELS[name](), friction=friction), STEPS)
+    data = model(MODELS[name](), friction=friction)
+    result = brief(Mechanism(**data), STEPS)
+    judged(data, result)
+    assert np.count_nonzero(result["status"] == Status.SOLVED) > STEPS - 4
     peak = float(np.abs(result["drive_power"]).max())
     assert np.abs(result["power_residual"]).max() < 1e-12 * peak
     assert np.abs(result["closure_residual"]).max() < 1e-13
@@ -88,7 +77,10 @@ def test_every_mechanism_of_the_tests_is_right(name: str, friction: float) -> No
 @pytest.mark.parametrize("name", mechanisms_space.NAMES)
 def test_every_mechanism_in_space_is_right(name: str, friction: bool) -> None:
     """With all kinds of joints, both models of a bearing's friction, and the pins of a cross, which feel each other."""
-    is_right(judged_spatial.judge, mechanisms_space.with_friction(name, friction), 9)
+    data = mechanisms_space.with_friction(name, friction)
+    result = brief(Mechanism(**data), 9)
+    judged(data, result)
+    assert np.count_nonzero(result["status"] == Status.SOLVED) > 5
 
 
 def test_the_judge_sees_a_joint_beside_its_seat() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from brief import brief
+from brief import brief, judged
 from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError, analyse
 
@@ -116,7 +116,7 @@ PLACES: dict[str, Any] = {  # m, as drawn
     "W": [0.0, 0.85, 0.0],
 }  # fmt: skip
 AXES = {"A": [1.0, 0.02, 0.01], "B": [1.0, -0.03, 0.04]}
-FORCE = np.array([400.0, 900.0, 4200.0])
+FORCE = [400.0, 900.0, 4200.0]
 
 
 def wishbone() -> Mechanism:
@@ -140,36 +140,18 @@ def wishbone() -> Mechanism:
     return Mechanism(
         space="spatial", links=drawn, joints=joints,
         drivers={"T": {"speed": 0.01, "range": [length - 0.02, length + 0.02]}},
-        loads={"road": {"link": "upright", "at": "W", "force": FORCE.tolist()}},
+        loads={"road": {"link": "upright", "at": "W", "force": FORCE}},
         assembly={"E": PLACES["E"], "F": PLACES["F"], "N": PLACES["N"], "L": PLACES["L"]},
     )  # fmt: skip
 
 
 @pytest.mark.slow
 def test_a_double_wishbone_with_a_strut() -> None:
-    """8 × 8: equilibrium of the upright, and of both arms about their axes; two spins, of the strut and the tie rod."""
+    """Every link is in equilibrium; two spins, of the strut and the tie rod, need nothing."""
     result = analyse(wishbone(), 9)
     assert codes(result).count("mobility.spin") == 2
-    place = {
-        point: result["point_position"].sel(point=f"{link}.{point}").values.T
-        for link, points in {"lower": "EL", "upper": "F", "upright": "NW"}.items()
-        for point in points
-    }
-    eye = np.eye(3)
-    for k in range(9):
-        e, f, n, w, low = (place[name][k] for name in "EFNWL")
-        tie, strut = n - PLACES["M"], low - PLACES["U"]
-        tie, strut = tie / np.linalg.norm(tie), strut / np.linalg.norm(strut)
-        lower, upper = (np.array(AXES[name]) / np.linalg.norm(AXES[name]) for name in "AB")
-        columns = [[*unit, *np.cross(e, unit), -lower @ np.cross(e - PLACES["A"], unit), 0.0] for unit in eye]
-        columns += [[*unit, *np.cross(f, unit), 0.0, -upper @ np.cross(f - PLACES["B"], unit)] for unit in eye]
-        columns += [[*tie, *np.cross(n, tie), 0.0, 0.0], [0.0] * 6 + [lower @ np.cross(low - PLACES["A"], strut), 0.0]]
-        found = np.linalg.solve(np.array(columns).T, [*-FORCE, *-np.cross(w, FORCE), 0.0, 0.0])
-        forces = result["reaction_force"].isel(position=k)
-        np.testing.assert_allclose(forces.sel(joint="E"), found[:3], rtol=1e-8, atol=1e-6)
-        np.testing.assert_allclose(forces.sel(joint="F"), found[3:6], rtol=1e-8, atol=1e-6)
-        np.testing.assert_allclose(forces.sel(joint="N"), found[6] * tie, rtol=1e-8, atol=1e-6)
-        np.testing.assert_allclose(result["drive_effort"].values[0, k], found[7], rtol=1e-8)
+    judged(wishbone().data(), result)
+    assert np.ptp(result["drive_effort"].values) > 10.0
 
 
 def test_a_pad_on_a_plane_under_a_ball() -> None:

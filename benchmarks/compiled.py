@@ -21,8 +21,8 @@ import numpy as np
 
 from trunnion import Mechanism
 from trunnion.cycle.positions import CHUNK
+from trunnion.solve.backward import pose_status, status_of
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.walk_kernel import WalkKernel
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -16,8 +16,8 @@ import numpy as np
 
 from benchmarks.drawn import planar, spatial
 from trunnion import Mechanism, MechanismError
+from trunnion.solve.backward import status_of
 from trunnion.solve.run import prepare
-from trunnion.solve.status import status_of
 from trunnion.solve.walk_kernel import WalkKernel
 
 DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}

@@ -236,8 +236,8 @@ _SOLVE = (
     Fault(
         "resisting-load-drives",
         "solve/loads.py",
-        "return _in_joint(walk, joint, -sign * size, turns, speed)",
-        "return _in_joint(walk, joint, sign * size, turns, speed)",
+        "_in_joint(walk, load.joint, -sign * size, turns, speed)",
+        "_in_joint(walk, load.joint, sign * size, turns, speed)",
         ("tests/invariants/test_loads.py", "-k", "resist"),
     ),
     Fault(

@@ -13,9 +13,9 @@ import trunnion
 from mechanisms import DURANGO
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.cycle.positions import Positions, positions
+from trunnion.solve.backward import status_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.status import status_of
 from trunnion.solve.walk_kernel import WalkKernel
 
 EXAMPLES = DURANGO.parent

@@ -31,10 +31,10 @@ from reference.space_oracle import Oracle
 from trunnion import FrictionMethod, Mechanism, Status, locking
 from trunnion.cycle.locking_course import multiples_at
 from trunnion.results.attributes import summary_of
+from trunnion.solve.backward import status_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.status import status_of
 from trunnion.solve.walk_kernel import WalkKernel
 
 ARM, GUIDE, LOAD = 0.15, 0.12, 40.0

@@ -11,11 +11,11 @@ from trunnion.engines import parts
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve import backward, row_code
+from trunnion.solve.backward import status_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.margin import margin_in
 from trunnion.solve.row_code import leaves_of
 from trunnion.solve.run import prepare
-from trunnion.solve.status import status_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 90

@@ -25,14 +25,13 @@ from trunnion.cycle.scales import scales_of
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import Figure
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, status_of
 from trunnion.solve.contacts import bearing_ends
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
-from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS, SEATED
 from trunnion.solve.system import System
 

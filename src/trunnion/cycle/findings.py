@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.cycle.course import CycleCourse, Means, course_of
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
@@ -28,7 +28,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS
 from trunnion.results.quantities import between, readable
 from trunnion.solve import loads
-from trunnion.solve.end_loads import NO_LOAD, EndLoads, plain
+from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import margin_in
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
@@ -427,7 +427,7 @@ def _slack(cycle: Cycle) -> Iterator[Finding]:
     for name in ropes:
         row, key = list(cycle.mechanism.gears).index(name), f"gears.{name}.radius"
         ends = [course.extreme("gear_torque", row, sign=sign, unit="N m") for sign in (-1.0, 1.0)]
-        low, high = (0.0 if top is None else top.value / abs(plain(cycle.run.values[key])) for top in ends)
+        low, high = (0.0 if top is None else top.value / abs(single(cycle.run.values[key])) for top in ends)
         if not low < -scales_of(cycle.run).floor("N") or not high > scales_of(cycle.run).floor("N"):
             continue
         places = " and ".join(course.told(top) for top in ends if top is not None)

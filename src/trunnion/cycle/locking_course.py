@@ -25,7 +25,7 @@ from trunnion.errors import Coded, Status
 from trunnion.results.attributes import MORE_THAN, Figure
 from trunnion.results.quantities import readable
 from trunnion.solve import continuation
-from trunnion.solve.backward import Backward, Given, backward
+from trunnion.solve.backward import Backward, Given, backward, status_of
 from trunnion.solve.bristles import histories
 from trunnion.solve.continuation import largest
 from trunnion.solve.forward import Forward
@@ -33,7 +33,6 @@ from trunnion.solve.friction import FrictionProblem, frictionless, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import least_beside, margin_in
-from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS, root
 from trunnion.solve.system import felt, law_of, scale_of
 

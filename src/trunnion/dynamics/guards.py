@@ -21,8 +21,8 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.solution import Ended, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment, repeated
 from trunnion.errors import Status
+from trunnion.solve.backward import NEAR_SINGULAR, pose_status
 from trunnion.solve.change_points import touched
-from trunnion.solve.status import NEAR_SINGULAR, pose_status
 
 __all__ = ["Crossing", "Guards", "dead_centre", "first_crossing"]
 

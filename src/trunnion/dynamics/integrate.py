@@ -30,7 +30,7 @@ from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
 from trunnion.dynamics.start import Places
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
-from trunnion.solve.status import pose_status
+from trunnion.solve.backward import pose_status
 
 __all__ = ["FINEST", "MOST_EVALUATIONS", "Integration"]
 

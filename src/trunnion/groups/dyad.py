@@ -144,6 +144,10 @@ class Dyad(ABC):
         at_c = added(times(first, pose.walls[0]), times(second, pose.walls[1]))
         return [minus(at_c, loads[0]), at_c, times(-1.0, added(at_c, loads[1]))]
 
+    def signature(self, pose: DyadPose, spread: float) -> list[Number]:
+        """Numbers that tell assemblies apart: places, over the spread, and directions of the links."""
+        return [n for frame in pose.frames for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)]
+
     def closure(self, pose: DyadPose) -> Number:
         """By how much the dyad is open, m."""
         return pose.closure

@@ -23,14 +23,13 @@ from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.dyad import DyadPose
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, pose_status
 from trunnion.solve.contacts import loads_on_ends
 from trunnion.solve.forward import Forward, PointMotion, SpatialWalk
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import SpringState, has_useful_work, springs, useful_powers
 from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.run import Run
-from trunnion.solve.status import pose_status
 from trunnion.solve.turns import near, turned
 
 __all__ = [

@@ -14,13 +14,12 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
 from trunnion.measures.measures import Measure
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, pose_status, status_of
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
-from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import Values
 
 __all__ = [

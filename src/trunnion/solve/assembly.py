@@ -48,7 +48,6 @@ from trunnion.solve.track import (
     closed_at,
     each_once,
     extent,
-    key_of,
     lane_of,
 )
 from trunnion.structure.decompose import Module
@@ -199,7 +198,7 @@ def _apart(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """At which times all poses of a module exist, and are apart."""
     spread, shape = float(np.max(primal(walk.size))), times.shape
-    rows = (key_of(walk.system.groups[number], pose, spread) for pose in poses)
+    rows = (walk.system.groups[number].signature(pose, spread) for pose in poses)
     keys = [np.array([np.broadcast_to(primal(n), shape) for n in numbers]) for numbers in rows]
     exist = np.asarray(np.isfinite(keys).all(axis=(0, 1)))
     return exist, exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)

@@ -10,11 +10,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, cut, namespace
 from trunnion.algebra.nested import flat
+from trunnion.errors import Status
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.friction import directed
 from trunnion.solve.contacts import contacts_of
@@ -23,16 +25,19 @@ from trunnion.solve.friction import Contact, Rubbing, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.gears import GearLoad, acting, gear_load, on_thread, power_of, teeth, units
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
-from trunnion.solve.system import Place, System, Values, law_of, law_parameters, rubbing
+from trunnion.solve.system import Place, System, Values, law_of, law_parameters, rubbing, sticking
 
 if TYPE_CHECKING:
     from trunnion.solve.row_code import RowCode
 
 __all__ = [
-    "Backward", "Given", "Sense", "backward", "by_numpy", "pass_on", "row_code", "sense_of", "solve", "unloaded",
+    "NEAR_SINGULAR", "Backward", "Given", "Sense", "backward", "by_numpy", "pass_on", "pose_status",
+    "pose_status_number", "row_code", "sense_of", "solve", "status_number", "status_of", "unloaded",
 ]  # fmt: skip
 
 MANY_MODULES = 12  # of a row that is solved by machine code: of fewer, loading LLVM takes longer
+SINGULAR = 1e6  # condition from which less than about four digits would be left
+NEAR_SINGULAR = 100.0  # a transmission angle of about a degree
 
 
 Sense = Share | tuple[Share, ...]
@@ -407,3 +412,46 @@ def _record(
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, total if link == second else algebra.times(-1.0, total))
+
+
+# ---- what a position is worth ----------------------------------------------------------------------------------
+
+
+def status_of(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
+    """The gravest status of every position."""
+    return np.array(np.broadcast_to(status_number(back), shape), np.int8)
+
+
+def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
+    """The gravest status of every position that its motion alone decides."""
+    return np.array(np.broadcast_to(pose_status_number(walk), shape), np.int8)
+
+
+def status_number(back: Backward) -> Number:
+    """The gravest status in whatever shape the numbers of the walk have."""
+    status = pose_status_number(back.walk)
+    reactions = (number for reaction in back.reactions.values() for number in flat(tuple(reaction)[:2]))
+    forces = (*back.efforts.values(), *back.friction.values(), *reactions)
+    reasons = {
+        Status.ZERO_SLIP: [back.resting[name] for name in sticking(back.walk.system)],
+        Status.NOT_CONVERGED: [np.logical_not(back.converged), ~np.isfinite(_sum(forces))],
+        Status.LOCKED: [np.less(back.share, 1.0)],
+        Status.LOAD_UNDEFINED: back.undefined.values(),
+    }
+    for code, where in reasons.items():
+        reached = functools.reduce(np.logical_or, where, np.False_)
+        status = np.maximum(status, np.where(reached, np.int8(code), np.int8(0)))
+    return status
+
+
+def pose_status_number(walk: Forward) -> Number:
+    """The gravest status that the motion alone decides, in whatever shape its numbers have."""
+    condition = walk.condition
+    status = np.where(condition > NEAR_SINGULAR, np.int8(Status.NEAR_SINGULAR), np.int8(Status.SOLVED))
+    status = np.where(condition <= SINGULAR, status, np.int8(Status.SINGULAR))
+    return np.where(walk.assembled, status, np.int8(Status.NOT_ASSEMBLED))
+
+
+def _sum(numbers: Iterable[Number]) -> Number:
+    """Without derivatives: whether it is finite is what is asked for."""
+    return functools.reduce(operator.add, (primal(number) for number in numbers), 0.0)

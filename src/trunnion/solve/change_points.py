@@ -28,7 +28,6 @@ from trunnion.solve.track import (
     Track,
     TrackClock,
     carried_on,
-    key_of,
 )
 from trunnion.structure.decompose import Module
 
@@ -181,7 +180,7 @@ def through(
     def numbers(which: int, moments: Array) -> Array:
         trial = posed(system, walk.values, walk.assembly[:number], moments)
         pose = pose_of(trial, number, group.BRANCHES[which], moments)
-        return np.array([np.broadcast_to(primal(n), moments.shape) for n in key_of(group, pose, size)])
+        return np.array([np.broadcast_to(primal(n), moments.shape) for n in group.signature(pose, size)])
 
     places, crossed, others = list[Meeting](), list[float](), len(group.BRANCHES) > 1
     for first, last in at:

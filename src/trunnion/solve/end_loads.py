@@ -24,16 +24,15 @@ from trunnion.algebra.nested import flat
 from trunnion.algebra.panels import ON_GRID
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, status_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.shifts import GivenSeat
-from trunnion.solve.status import status_of
 from trunnion.solve.system import rubbing
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["NO_LOAD", "Crossing", "End", "EndLoads", "end_loads", "loads_of", "plain", "reactions"]
+__all__ = ["NO_LOAD", "Crossing", "End", "EndLoads", "end_loads", "loads_of", "reactions"]
 
 Array = NDArray[np.float64]
 NO_LOAD = 1e-9  # of the largest reaction: a load below it is rounding and presses nothing anywhere
@@ -210,7 +209,9 @@ class EndLoads:
     def _level(self, end: End, time: Array) -> Array:
         """The load of an end, N, that the play itself changes nearly as much as it is."""
         size = self.courses.at(time)[self.total]
-        play = end.radius / max(plain(self.run.system.size(self.run.values)), plain(end.seat.play.length) * end.spread)
+        play = end.radius / max(
+            single(self.run.system.size(self.run.values)), single(end.seat.play.length) * end.spread
+        )
         return np.asarray(CROSSING * play * np.maximum(np.nan_to_num(size), QUIET * self.largest))
 
     def _dips(self, end: End, peak: float) -> Iterator[Crossing]:
@@ -255,11 +256,6 @@ def _least(coefficients: Array) -> tuple[Array, Array, Array]:
     return spots, np.asarray(values), np.asarray(slopes)
 
 
-def plain(number: Number) -> float:
-    """A number that does not change along the way."""
-    return single(number)
-
-
 def _size(vector: Array, axis: int = 0) -> Array:
     return np.asarray(np.sqrt(np.sum(vector * vector, axis=axis)))
 
@@ -292,7 +288,7 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
     ends, first = [], 0
     for seat in seats:
         for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
-            ends.append(End(seat, number, list(range(first, first + len(end))), plain(radius)))
+            ends.append(End(seat, number, list(range(first, first + len(end))), single(radius)))
             first += len(end)
     rates = first + 1 + count * len(system.joints)
     senses, last = {}, rates

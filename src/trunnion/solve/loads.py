@@ -16,7 +16,6 @@ from trunnion.algebra.nested import flat
 from trunnion.algebra.spline import look_up
 from trunnion.model.expression import PLACED
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import Load
 from trunnion.solve.forward import Assembly, Forward, Vector, forward, start
 from trunnion.solve.system import System, Values
 
@@ -180,39 +179,29 @@ def stated_loads(
     walk: Forward, zero_slip: Mapping[str, Share], sensed: Container[str] = ()
 ) -> Iterator[tuple[str, LoadAction]]:
     """The loads of the model, by name. zero_slip: see `backward.Given`; sensed: joints of which it tells all."""
-    expressions = Stated(walk)
+    expressions, algebra = Stated(walk), walk.algebra
     for name, load in walk.system.mechanism.loads.items():
-        path, joint = f"loads.{name}", load.joint
-        if joint is None:
-            yield name, _push(expressions, load, path)
-        else:
-            yield name, _resist(expressions, load, path, zero_slip.get(joint, 0.0), joint in sensed)
-
-
-def _push(expressions: Stated, load: Load, path: str) -> LoadAction:
-    """A force at a point of a link and a moment, in global axes or the link's."""
-    walk, link, algebra = expressions.walk, load.link or "", expressions.walk.algebra
-    frame, twist, _ = walk.motions[link]
-    force, moment = expressions.vector(f"{path}.force") or algebra.NULL, expressions.get(f"{path}.moment")
-    if moment is None:
-        moment = expressions.vector(f"{path}.moment") or algebra.NO_MOMENT
-    if load.frame == "link":
-        force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
-    place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
-    wrench = algebra.about(force, moment, place)
-    return LoadAction([(link, wrench)], algebra.power(wrench, twist))
-
-
-def _resist(expressions: Stated, load: Load, path: str, at_rest: Share, sensed: bool) -> LoadAction:
-    """A torque or force that opposes the motion of a joint, whichever way it goes or one way only."""
-    walk, joint = expressions.walk, load.joint or ""
-    torque, force = expressions.get(f"{path}.resisting_torque"), expressions.get(f"{path}.resisting_force")
-    size, turns = (force, False) if torque is None else (torque, True)
-    speed = walk.rates(joint)[0 if turns else 1]
-    sign = _sense(walk, joint, turns, speed, at_rest, sensed)
-    if load.only is not None:
-        sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
-    return _in_joint(walk, joint, -sign * size, turns, speed)
+        path = f"loads.{name}"
+        if load.joint is None:  # a force at a point of a link and a moment, in global axes or the link's
+            link = load.link or ""
+            frame, twist, _ = walk.motions[link]
+            force, moment = expressions.vector(f"{path}.force") or algebra.NULL, expressions.get(f"{path}.moment")
+            if moment is None:
+                moment = expressions.vector(f"{path}.moment") or algebra.NO_MOMENT
+            if load.frame == "link":
+                force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
+            place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
+            wrench = algebra.about(force, moment, place)
+            yield name, LoadAction([(link, wrench)], algebra.power(wrench, twist))
+            continue
+        # a torque or force that opposes the motion of a joint, whichever way it goes or one way only
+        torque, force = expressions.get(f"{path}.resisting_torque"), expressions.get(f"{path}.resisting_force")
+        size, turns = (force, False) if torque is None else (torque, True)
+        speed = walk.rates(load.joint)[0 if turns else 1]
+        sign = _sense(walk, load.joint, turns, speed, zero_slip.get(load.joint, 0.0), load.joint in sensed)
+        if load.only is not None:
+            sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
+        yield name, _in_joint(walk, load.joint, -sign * size, turns, speed)
 
 
 def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share, sensed: bool) -> Number:

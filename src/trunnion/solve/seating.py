@@ -22,13 +22,13 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.dual import Dual, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, flat
 from trunnion.algebra.panels import FIT, ORDER, POINTS
 from trunnion.joints.clearance import pressed, turned_by_friction
 from trunnion.solve.backward import Backward, Sense
-from trunnion.solve.end_loads import NO_LOAD, EndLoads, end_loads, loads_of, plain, reactions
+from trunnion.solve.end_loads import NO_LOAD, EndLoads, end_loads, loads_of, reactions
 from trunnion.solve.forward import Travel, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.switches import accuracy_of, breaks_between
@@ -182,7 +182,7 @@ class _Settling:
         for seat in run.seats:
             if seat.given is not None:
                 offsets = seat.play.model.paths(f"seats.{seat.joint}", seat.given)
-                self.fixed |= {path: plain(number) for path, number in offsets.items()}
+                self.fixed |= {path: single(number) for path, number in offsets.items()}
         self.seats = [seat for seat in run.seats if seat.given is None]
         self.paths = [f"seats.{seat.joint}.{key}" for seat in self.seats for end in seat.play.model.ends for key in end]
         self.change = np.zeros(4)

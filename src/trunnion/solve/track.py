@@ -22,7 +22,7 @@ from trunnion.solve.system import System, Values
 
 __all__ = [
     "GUESSES", "SAME", "SEED", "TOUCHING", "Assemblies", "Follower", "Track", "TrackClock", "alternating", "at",
-    "carried_on", "closed_at", "each_once", "extent", "guess_reaches", "key_of", "lane_of",
+    "carried_on", "closed_at", "each_once", "extent", "guess_reaches", "lane_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def closed_at(
     start = [rng.uniform(-reach, reach, shape) for reach in guess_reaches(group, spread)]
     pose = group.position(elements, start, [lane_of(number, lanes) for number in drive])
     q = np.array([np.broadcast_to(pose.q[i], shape) for i in group.kept])
-    key = np.array([np.broadcast_to(n, shape) for n in key_of(group, pose, spread)])
+    key = np.array([np.broadcast_to(n, shape) for n in group.signature(pose, spread)])
     closed = np.isfinite(key).all(axis=0) & np.isfinite(q).all(axis=0)
     return Assemblies(pose, closed & (np.broadcast_to(pose.condition, shape) < MOST_CONDITION), q, key)
 
@@ -92,13 +92,6 @@ def each_once(group: Tree, solved: Assemblies) -> list[int]:
         if all(np.max(np.abs(key[:, lane] - key[:, other])) > SAME for other in lanes):
             lanes.append(int(lane))
     return sorted(lanes, key=lambda lane: tuple(np.round(key[:, lane], 6)))
-
-
-def key_of(group: Any, pose: Any, spread: float) -> list[Number]:
-    """Numbers that tell the assemblies of a group apart: places, over the spread, and directions of its links."""
-    if isinstance(group, Tree):
-        return group.signature(pose, spread)
-    return [n for frame in pose.frames for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)]
 
 
 def guess_reaches(group: Tree, spread: float) -> list[float]:
@@ -274,7 +267,7 @@ class Follower:
         """What tells the assembly from others at some positions, (entry, place)."""
         elements = at(self.elements, places)
         pose = self.group.position(elements, list(rows), [lane_of(n, places) for n in self.drive])
-        numbers = key_of(self.group, pose, extent(self.group, elements))
+        numbers = self.group.signature(pose, extent(self.group, elements))
         return np.array([np.broadcast_to(n, places.shape) for n in numbers])
 
 

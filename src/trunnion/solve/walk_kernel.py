@@ -20,13 +20,12 @@ from trunnion.algebra.namespace import Number, UntraceableError
 from trunnion.engines.graph import BOTH, POSITION, SAMPLE, Graph
 from trunnion.engines.recorded import STRUCTURAL, Recorded, number_of
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import NEAR_SINGULAR, Backward, pose_status, pose_status_number, status_number, status_of
 from trunnion.solve.forward import forward
 from trunnion.solve.friction import STUBBORN
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run
-from trunnion.solve.status import NEAR_SINGULAR, pose_status, pose_status_number, status_number, status_of
 from trunnion.solve.system import Values, law_of, rubbing
 
 if TYPE_CHECKING:

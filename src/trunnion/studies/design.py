@@ -27,10 +27,10 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import Figure
 from trunnion.results.scales import EVERYWHERE
+from trunnion.solve.backward import pose_status
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.status import pose_status
 from trunnion.solve.switches import Mechanisms, knots_of
 
 __all__ = [

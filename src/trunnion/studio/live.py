@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import flat
 from trunnion.errors import MechanismError, Status
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, status_of
 from trunnion.solve.forward import Forward
 from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.status import status_of
 from trunnion.solve.system import Values, rubbing
 from trunnion.studio.loaded import Asked, Loaded, loaded
 from trunnion.studio.sketch import refused

@@ -23,11 +23,10 @@ from trunnion.model.parameters import measured
 from trunnion.model.rules import Within
 from trunnion.rig.modelled import turned
 from trunnion.solve import shifts
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, pose_status, status_of
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.status import pose_status, status_of
 
 __all__ = ["Courses", "DriveCycle", "Model", "Parameters", "Unknown", "limits", "paths_of", "unknowns"]
 

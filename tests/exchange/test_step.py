@@ -196,7 +196,7 @@ def bolted(screws):
     if screws:
         parts |= {f"screw{n}": (screw, np.eye(3), np.array([*corner, -10.0])) for n, corner in enumerate(corners)}
     one = [name for name in parts if name != "arm"]
-    pairs = {("base", "arm"): ("cylindrical", 8, 8.025, 10)}
+    pairs = {("base", "arm"): ("revolute" if screws else "cylindrical", 8, 8.025, 10)}  # between plate and heads
     return Case(parts, "base", {"drive", "fixed"}, {"base": one, "arm": ["arm"]}, pairs)
 
 

@@ -176,7 +176,7 @@ HOSTILE: dict[str, dict[str, bytes | str | Callable[[Path], object]]] = {
         "junk with a head": b"ISO-10303-21;" + bytes(range(256)) * 40 + b"ENDSEC;",
         "cut off": of_step(lambda text: text[: len(text) // 2]),
         "a missing entity": of_step(lambda text: re.sub(r"#40=.*\n", "", text)),
-        "brackets": of_step(lambda text: text.replace("#40=", "#40=" + "X(" * 5000, 1)),
+        "brackets": of_step(lambda text: text.replace("CLOSED_SHELL", "X(" * 5000 + "CLOSED_SHELL", 1)),
         "open comments": of_step(lambda text: text.replace("DATA;", "DATA;" + "#1=/*" * 300_000)),
         "open texts": of_step(lambda text: text.replace("DATA;", "DATA;" + "#1='" * 300_001)),
         "slashes": of_step(lambda text: text.replace("DATA;", "DATA;#1=" + "/ *" * 10**6 + "/*")),

@@ -26,7 +26,6 @@ from timed import (
     wheel,
 )  # fmt: skip
 from trunnion import MechanismError, Status, analyse, read, simulate
-from trunnion.dynamics import compiled_rates
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.rates import Walks
@@ -253,7 +252,7 @@ def test_a_range_ends_the_motion_of_several_drivers(
 ) -> None:
     """θ = θ₀ + T t²/(2 J), of the one that gets there first, driven either way."""
     if not compiled:
-        monkeypatch.setattr(compiled_rates, "compilable", lambda motion: False)
+        monkeypatch.setattr("trunnion.dynamics.simulate.rates_of", Walks)
     flat = space == "planar"
     kind = PARALLELOGRAM[0], [0.875, -0.273]  # at the start of the range
     data = beside(driven_four_bar(space, *kind, range=[-2.0, 1.7 if first else 2.9])).data()

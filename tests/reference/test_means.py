@@ -283,3 +283,13 @@ def test_locking_counts_it() -> None:
     ]
     assert 0 < numbers[0]["efficiency_reverse"] < 1
     assert numbers[0]["efficiency_reverse"] == pytest.approx(numbers[1]["efficiency_reverse"], rel=1e-6)
+
+
+@pytest.mark.parametrize(("times", "rough"), [(20, False), (3000, True)])
+def test_what_changes_too_finely_to_be_resolved_is_told(times: int, rough: bool) -> None:
+    """A load that changes 20 times over the cycle is resolved; of one that changes 3000 times the share is told."""
+    loads = {"work": {"joint": "S", "resisting_force": f"1 kN * (2 + sin({times} * drive))", "useful": True}}
+    result = analyse(Mechanism(**{**PRESS, "loads": loads}), 7)
+    told = [one.figures["share"] for one in result.trunnion.findings if one.code == "cycle.rough"]
+    assert bool(told) == rough
+    assert all(share > 1e-6 for share in told)

@@ -287,6 +287,8 @@ def test_a_controller_does_not_wind_up_at_rest() -> None:
     result = simulate(wheel(motor, drag=0.6), 20.0, 4)
     assert np.all(result["drive_rate"].values == 0.0)  # 0.5 N m never get over 0.6
     assert result["drive_effort"].values[0, -1] == pytest.approx(0.5, rel=1e-9)
+    (most,) = [figure.value for figure in result.trunnion.summary if figure.name == "A.effort_max"]
+    assert most == pytest.approx(0.5, rel=1e-14)  # the limit itself, though the effort bends there
 
 
 def test_a_controller_does_not_wind_up_while_its_limit_holds() -> None:

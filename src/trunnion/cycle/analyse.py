@@ -96,19 +96,16 @@ def analysed(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    time = None if at is None else _time(run, at)
+    time = None
+    if at is not None:
+        place, timed = place_of(run.system.mechanism, at)
+        if run.cycle.duration <= 0:
+            raise MechanismError(Finding("nothing moves: there is one position", "at", "remove at"))
+        time = time_of(run, place, timed, "at")
     at_positions = positions(
         run, steps, method, progress, selection.margin, engine=engine, wanted=selection.variables, at=time
     )
     return result_of(run, at_positions, selection)
-
-
-def _time(run: Run, at: float | str) -> float:
-    """The time, s, of a position as a user writes it; MechanismError where the cycle has none there, or many."""
-    place, timed = place_of(run.system.mechanism, at)
-    if run.cycle.duration <= 0:
-        raise MechanismError(Finding("nothing moves: there is one position", "at", "remove at"))
-    return time_of(run, place, timed, "at")
 
 
 @np.errstate(all="ignore")

@@ -221,21 +221,17 @@ class CycleCourse:
         place = courses.extreme(of, sign, chosen, scales_of(self.run).floor(unit))
         if place is None or not place.at_break:
             return place
-        away = courses.span * POLE
-        ends = [end for end in self._ends_about(place.time) if courses.edges[0] <= end <= courses.edges[-1]]
+        breaks, away = courses.breaks, courses.span * POLE
+        k = int(np.argmin(np.abs(breaks - place.time)))
+        # positions close to a singular one may begin here: then the number grows towards that
+        others = np.array([breaks[other] for other in (k - 1, k + 1) if 0 <= other < len(breaks)])
+        close = self.status[courses.panel((others + breaks[k]) / 2)] == Status.NEAR_SINGULAR
+        ends = [end for end in (place.time, *others[close]) if courses.edges[0] <= end <= courses.edges[-1]]
         times = np.array([times for end in ends for times in (end - away, end + away)])
         inside = np.all((times >= courses.edges[0]) & (times <= courses.edges[-1]), axis=1)
         values = sign * of(courses.at(times.ravel())).reshape(times.shape)
         grows = inside & np.all(values[:, :-1] > GROWS * np.abs(values[:, 1:]), axis=1)
         return place._replace(value=sign * np.inf) if np.any(grows) else place
-
-    def _ends_about(self, time: float) -> list[float]:
-        """A break, s, and those at which it is singular where positions close to that begin there."""
-        breaks = self.courses.breaks
-        k = int(np.argmin(np.abs(breaks - time)))
-        others = np.array([breaks[other] for other in (k - 1, k + 1) if 0 <= other < len(breaks)])
-        close = self.status[self.courses.panel((others + breaks[k]) / 2)] == Status.NEAR_SINGULAR
-        return [time, *others[close]]
 
     def figure(self, name: str, subject: str, top: Place, unit: str, aspect: str) -> Figure:
         """An extreme as a figure: none where it has no bound."""
@@ -376,7 +372,15 @@ class _Looking:
             meant = self._filled(self.run.ideal.solve(time, method=self.method), time)
             fill_errors(arrays, meant, self.run.system, slice(None))
         if self.seats:
-            self._stand_in(arrays, meant, valid)
+            # where a pin loses contact the mechanism without errors stands in for it, with what that may change
+            powers = [np.sum(part["drive_power"], axis=0) for part in (arrays, meant)]
+            apart = np.abs(powers[1] - np.where(np.isfinite(powers[0]), powers[0], 0.0))
+            lost = ~valid & (arrays["status"] < Status.NOT_CONVERGED)
+            for name in self._names:
+                if name in meant and name not in COMPARED_ROWS:
+                    arrays[name] = np.where(valid, arrays[name], meant[name])
+            arrays[SUPPOSED] = np.where(valid, 0.0, apart)
+            arrays["status"] = np.where(lost, np.maximum(arrays["status"], Status.CONTACT_LOST), arrays["status"])
             sticks = self.seats.sticks(time)
             arrays["status"] = np.where(sticks, np.maximum(arrays["status"], Status.ZERO_SLIP), arrays["status"])
         self.shapes, rows = stacked(arrays, (*self._names, SUPPOSED), 1)
@@ -391,17 +395,6 @@ class _Looking:
             for i, joint in enumerate(self.run.system.joints):
                 arrays["end_load"][i, bearing_ends(self.run.system.mechanism, joint) :] = 0.0
         return arrays
-
-    def _stand_in(self, arrays: Arrays, meant: Arrays, valid: NDArray[np.bool_]) -> None:
-        """Where a pin loses contact the mechanism without errors stands in for it, with what that may change."""
-        powers = [np.sum(part["drive_power"], axis=0) for part in (arrays, meant)]
-        apart = np.abs(powers[1] - np.where(np.isfinite(powers[0]), powers[0], 0.0))
-        lost = ~valid & (arrays["status"] < Status.NOT_CONVERGED)
-        for name in self._names:
-            if name in meant and name not in COMPARED_ROWS:
-                arrays[name] = np.where(valid, arrays[name], meant[name])
-        arrays[SUPPOSED] = np.where(valid, 0.0, apart)
-        arrays["status"] = np.where(lost, np.maximum(arrays["status"], Status.CONTACT_LOST), arrays["status"])
 
 
 def stacked(arrays: Arrays, names: Sequence[str], places: int) -> tuple[dict[str, tuple[int, ...]], Array]:

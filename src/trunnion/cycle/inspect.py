@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly_modes import GroupModes, choices
 from trunnion.solve.forward import Forward, forward
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.structure.decompose import Plan, mobility_by_rank
 
 __all__ = ["Check", "check"]
@@ -67,21 +67,16 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
         remedy = "the geometry is special: reactions or motion are not determined"
         figures = {"formula": run.system.plan.mobility, "rank": rank}
         notes.append(Finding.warning("mobility.special", "joints", what, remedy, **figures))
-    notes += [*shared_dimensions(mechanism), *_unplaced(run)]
+    notes += shared_dimensions(mechanism)
+    for measure in named(mechanism, list(mechanism.measures), run.values):
+        if not measure.in_time and (measure.at is not None or measure.over is not None):
+            try:
+                ends_by_name(run, [measure])
+            except MechanismError as error:  # a place, or a range, that the cycle has not: no study can have them
+                notes += [replace(finding, severity=Severity.WARNING) for finding in error.findings]
     order = list(Severity)
     notes.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(notes))
-
-
-def _unplaced(run: Run) -> Iterator[Finding]:
-    """Measures at a place, or over a range, that the cycle has not: no study can have them."""
-    for measure in named(run.system.mechanism, list(run.system.mechanism.measures), run.values):
-        if measure.in_time or (measure.at is None and measure.over is None):
-            continue
-        try:
-            ends_by_name(run, [measure])
-        except MechanismError as error:
-            yield from (replace(finding, severity=Severity.WARNING) for finding in error.findings)
 
 
 def _rank(walk: Forward) -> int | None:

@@ -94,21 +94,15 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     }
     result = with_variables(result, described(arrays, along_positions(LOCKING), member_units(run.system)))
     result["locking_state"].attrs.update(codes("flag", LockingState))
-    notes = finding_rows(_notes(run))
-    findings = {"findings": [*attribute(result, "findings"), *notes]} if notes else {}
-    ranges = {} if course is None else {"locking_ranges": course.attribute(time, near)}
-    return result.assign_attrs(encoded({**ranges, **findings}))
-
-
-def _notes(run: Run) -> list[Finding]:
-    """What the states leave out: seats of pins; loads that move them."""
-    notes = []
+    findings = {}
     if run.seats:
         what = f"locking takes the seats of {', '.join([seat.joint for seat in run.seats])} for the margin and for "
         what += "where it locks forward; all else is of pins in the middle of their play: the other states and their "
         what += "ranges, the motion backward, critical multiples of single joints"
-        notes.append(Finding.note("locking.pins_centred", "joints", what, joints=[seat.joint for seat in run.seats]))
-    return notes
+        note = Finding.note("locking.pins_centred", "joints", what, joints=[seat.joint for seat in run.seats])
+        findings["findings"] = [*attribute(result, "findings"), *finding_rows([note])]
+    ranges = {} if course is None else {"locking_ranges": course.attribute(time, near)}
+    return result.assign_attrs(encoded({**ranges, **findings}))
 
 
 def report_figures(run: Run) -> list[Figure]:

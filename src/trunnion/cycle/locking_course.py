@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.course import Accuracy, Place
 from trunnion.algebra.dual import primal
 from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
@@ -416,8 +416,13 @@ class LockingCourse:
             (STATES[code], low, high)
             for code, low, high in _merged(courses.edges, courses.states, SHORT * courses.span)
         ]
-        if self.margins is not None:
-            parts += [(None, low, high) for low, high in self._close_to_locking(self.margins.courses, near)]
+        if self.margins is not None:  # where it runs with a margin below `near`
+            margins = self.margins.courses
+            cut = margins.parted(np.concatenate([courses.edges, margins.passages(0, near)]))
+            middles = cut.edges[:-1] + cut.half
+            close = (cut.at(middles)[0] < near) & ~np.isin(self.states_at(middles), NO_MARGIN)
+            ranges = _merged(cut.edges, close.astype(int), SHORT * cut.span)
+            parts += [(None, low, high) for below, low, high in ranges if below]
         values, places = _on_dial(self.run, [end for _, *ends in parts for end in ends])
         return [
             LockingRange(
@@ -425,14 +430,6 @@ class LockingCourse:
             )
             for k, (state, low, high) in enumerate(parts)
         ]
-
-    def _close_to_locking(self, margins: Courses, near: float) -> list[tuple[float, float]]:
-        """Begin and end, s, of where it runs with a margin below `near`."""
-        cut = margins.parted(np.concatenate([self.course.courses.edges, margins.passages(0, near)]))
-        middles = cut.edges[:-1] + cut.half
-        close = (cut.at(middles)[0] < near) & ~np.isin(self.states_at(middles), NO_MARGIN)
-        parts = _merged(cut.edges, close.astype(int), SHORT * cut.span)
-        return [(low, high) for below, low, high in parts if below]
 
     def _least(self, low: float, high: float) -> tuple[float, str]:
         """The smallest margin between two times, s, and where."""

@@ -130,7 +130,12 @@ def positions(
     s, for that position alone.
     """
     check_steps(steps)
-    _refuse_seats(run)
+    seated = {seat.joint for seat in run.seats}
+    for module in run.system.plan.modules:
+        if module.redundant and (names := [name for name in module.joints if name in seated]):
+            what = f"the links {', '.join(module.links)} are over-constrained: they do not close with seat: loaded"
+            remedy = "analyse with --seat free; see `trunnion assemble` for the play that it needs"
+            raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
     method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps) if at is None else np.array([at])
@@ -178,17 +183,6 @@ def stretch(
     means = unknown(len(run.system.mechanism.drivers), len(run.system.joints))
     dial = run.system.dial(run.values, time)
     return Positions(arrays, names, time, dial, method, causes, means, means if run.erring else None)
-
-
-def _refuse_seats(run: Run) -> None:
-    """MechanismError where pins lie in seats of a module that closes with special dimensions only."""
-    seated = {seat.joint for seat in run.seats}
-    for module in run.system.plan.modules:
-        names = [name for name in module.joints if name in seated]
-        if module.redundant and names:
-            what = f"the links {', '.join(module.links)} are over-constrained: they do not close with seat: loaded"
-            remedy = "analyse with --seat free; see `trunnion assemble` for the play that it needs"
-            raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
 def _fill(arrays: Arrays, run: Run, time: Array, window: slice, method: FrictionMethod, causes: Causes) -> None:

@@ -21,15 +21,15 @@ LOOKED = 24  # positions: the scales are orders of magnitude
 
 def scales_of(run: Run) -> Scales:
     """The scales over the cycle, whatever positions are asked for; pins are in the middle of their play."""
-    return run.once("scales", lambda: largest(run, _looked(run)))
 
+    def looked() -> Scales:
+        time = run.cycle.times(LOOKED if run.cycle.duration > 0 else 1)
+        arrays = allocate(run.system, len(time))
+        with np.errstate(all="ignore"):
+            fill_chunk(arrays, run.solve(time), slice(None))
+        return largest(run, arrays)
 
-def _looked(run: Run) -> Mapping[str, NDArray[np.float64]]:
-    time = run.cycle.times(LOOKED if run.cycle.duration > 0 else 1)
-    arrays = allocate(run.system, len(time))
-    with np.errstate(all="ignore"):
-        fill_chunk(arrays, run.solve(time), slice(None))
-    return arrays
+    return run.once("scales", looked)
 
 
 def largest(run: Run, arrays: Mapping[str, NDArray[np.float64]]) -> Scales:

@@ -150,12 +150,15 @@ def load_courses(run: Run, time: NDArray[np.float64]) -> dict[str, Any]:
     if len(time) > COURSE or not varying:
         return {}
     numbers = _numbers(run, time)
-    return {
-        "load_courses": {
-            name: {what: [_plain_numbers(part, time.shape) for part in parts] for what, parts in numbers[name].items()}
-            for name in varying
-        }
+
+    def plain(number: Number) -> list[float | None]:
+        values = np.broadcast_to(np.asarray(primal(number), float), time.shape).tolist()
+        return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values]
+
+    courses = {
+        name: {what: [plain(part) for part in parts] for what, parts in numbers[name].items()} for name in varying
     }
+    return {"load_courses": courses}
 
 
 def _numbers(run: Run, time: NDArray[np.float64]) -> dict[str, dict[str, list[Number]]]:
@@ -183,11 +186,6 @@ def _varies(run: Run, load: str) -> bool:
     """Whether a load has numbers that speak of the motion."""
     paths = {path for path in run.system.mechanism.parameter_set.entries if path.startswith(f"loads.{load}.")}
     return not run.values.keys() >= paths
-
-
-def _plain_numbers(number: Number, shape: tuple[int, ...]) -> list[float | None]:
-    values = np.broadcast_to(np.asarray(primal(number), float), shape).tolist()
-    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values]
 
 
 def _largest(components: list[Number]) -> list[float]:

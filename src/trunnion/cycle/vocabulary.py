@@ -77,11 +77,13 @@ def vocabulary(mechanism: Mechanism) -> Vocabulary:
     of_cycle = watched(run, np.zeros(1), FrictionMethod())
     figures = dict(zip((item.name for item in of_cycle.measures), of_cycle.figures, strict=True))
     listed = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
-    starts = _at_the_start(run, listed)
-    measures = []
+    open_ = run.determinacy is not None and any(item.severity is Severity.ERROR for item in run.determinacy.findings())
+    single = [item for item in listed if item.single(run.system) and (item.of_motion or not open_)]
+    starts, measures = courses_of(run, single, np.zeros(1), FrictionMethod())[0], []
     for measure in listed:
         value = float(figures.get(measure.name, np.nan))
-        value = value if np.isfinite(value) else starts.get(measure.name, np.nan)
+        if not np.isfinite(value) and measure.name in starts:
+            value = float(np.ravel(primal(starts[measure.name][0]))[0])
         unit, is_stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
         measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, is_stated))
     return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(of_cycle.findings))
@@ -122,11 +124,3 @@ def _others(run: Run) -> Iterator[Measure]:
                     if measure.of_places:
                         measure.curve(walk)
                     yield measure
-
-
-def _at_the_start(run: Run, measures: list[Measure]) -> dict[str, float]:
-    """Value of every measure of one number at the start of the cycle, by name; NaN where it has none there."""
-    open_ = run.determinacy is not None and any(item.severity is Severity.ERROR for item in run.determinacy.findings())
-    single = [item for item in measures if item.single(run.system) and (item.of_motion or not open_)]
-    courses = courses_of(run, single, np.zeros(1), FrictionMethod())[0]
-    return {name: float(np.ravel(primal(parts[0]))[0]) for name, parts in courses.items()}

@@ -310,7 +310,10 @@ class ActiveMotion(Integration):
             return self.dynamics.look(self.layout.moment(times, np.asarray(dense(times)), self.mode))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
-        if stretch.resting and not (self.motion.several or self._may_change()):
+        mechanism = self.motion.system.mechanism
+        varies = any(entry.varies for entry in mechanism.parameter_set.entries.values())
+        changes = self.motion.several or len(mechanism.drivers) > 1 or varies or self._drive.timed
+        if stretch.resting and not changes:
             return None
 
         def values(times: Array) -> Array:
@@ -332,12 +335,6 @@ class ActiveMotion(Integration):
         if not (self.motion.several or self.resting):  # the bends on either side of the coordinate
             guards += [("bend", 0, at.q[0] - self.between[0]), ("bend", 1, self.between[1] - at.q[0])]
         return guards
-
-    def _may_change(self) -> bool:
-        """Whether anything may change while the one free coordinate rests."""
-        system, driven = self.motion.system, len(self.motion.system.mechanism.drivers) > 1
-        varies = any(entry.varies for entry in system.mechanism.parameter_set.entries.values())
-        return driven or varies or self._drive.timed
 
     def _gaps(self, at: Moment) -> Array:
         """Gaps, m, (contact, lane), negative where a contact that touches is open or another has closed."""

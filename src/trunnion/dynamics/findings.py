@@ -12,7 +12,7 @@ from trunnion.algebra.dual import single
 from trunnion.cycle.findings import effort_units
 from trunnion.dynamics.opened import in_play, of_several
 from trunnion.dynamics.rates import Layout
-from trunnion.dynamics.solution import Ended, Solution, Stretch
+from trunnion.dynamics.solution import Ended, Solution
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError, Status, agreeing, counted
 from trunnion.joints.contact import restitution_of
@@ -311,11 +311,17 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
         where, subject, at_place = f"drivers.{name}", name, f", at {readable(place, unit)}"
         acts = f"{readable(acting, effort)} act on it, and it breaks away from {readable(needed, effort)} on"
         figures = {"driver": name, "given": acting, "needed": needed, "unit": effort}
-    since = readable(rests[-1], "s")
+    since, final = readable(rests[-1], "s"), last.at(solution.layout, np.array([solution.end]))
+    on = [
+        driver
+        for i, (driver, drive) in enumerate(motion.drives.items())
+        if not drive.braking(final.now)
+        and np.any(drive.seen(final.now, final.slips).shaft(final.time, final.rate[i], final.integral[i], final.now))
+    ]  # motors that give an effort, without a brake
     if all(stretch.resting for stretch in solution.stretches):
         remedy = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
         yield Finding.warning("simulate.stays_at_rest", where, f"{subject} does not start: {acts}", remedy, **figures)
-    elif on := _on(motion, solution, last):
+    elif on:
         figures |= {"time": rests[-1], "drivers": on} if motion.several else {
             "time": rests[-1], "coordinate": place, "place": "rad" if turns else "m"
         }  # fmt: skip
@@ -325,17 +331,6 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     else:
         what = f"{subject} comes to rest {counted(len(rests), 'time')}, for the last time at {since}: {acts}"
         yield Finding.note("simulate.rests", where, what, **figures, time=rests[-1], times=len(rests))
-
-
-def _on(motion: FreeMotion, solution: Solution, last: Stretch) -> list[str]:
-    """Drivers whose motor gives an effort at the end of a motion, without a brake."""
-    at = last.at(solution.layout, np.array([solution.end]))
-    return [
-        name
-        for i, (name, drive) in enumerate(motion.drives.items())
-        if not drive.braking(at.now)
-        and np.any(drive.seen(at.now, at.slips).shaft(at.time, at.rate[i], at.integral[i], at.now) != 0.0)
-    ]
 
 
 def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:

@@ -64,19 +64,14 @@ def first_crossing(values: Callable[[Array], Array], begin: float, times: Array)
             near = values(nearer)[row]
             good = np.flatnonzero(near > 0.0)
             low, high = (nearer[good[-1]], high) if len(good) else (nearer[np.argmax(near < 0.0)],) * 2
-        place = _far_side(value, low, high)
+        # on the side on which it is negative: a force that begins there has begun
+        place = float(brentq(value, low, high, xtol=1e-16, rtol=8.9e-16)) if value(low) > 0.0 else low
+        step = np.spacing(abs(place))
+        while place < high and value(place) >= 0.0:
+            place, step = min(place + step, high), 2.0 * step
         if first is None or place < first.time:
             first = Crossing(int(row), place)
     return first
-
-
-def _far_side(value: Callable[[float], float], low: float, high: float) -> float:
-    """Where a number becomes negative, on the side on which it is: a force that begins there has begun."""
-    place = float(brentq(value, low, high, xtol=1e-16, rtol=8.9e-16)) if value(low) > 0.0 else low
-    step = np.spacing(abs(place))
-    while place < high and value(place) >= 0.0:
-        place, step = min(place + step, high), 2.0 * step
-    return place
 
 
 @dataclass

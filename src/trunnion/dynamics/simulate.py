@@ -104,7 +104,15 @@ def simulated(
     if not playing:
         refuse_undetermined(run)
     duration = CYCLES * run.cycle.duration if duration is None else duration
-    _check_numbers(duration, steps, tolerance, evaluations)
+    checks = {
+        "duration": (np.isfinite(duration) and duration > 0, duration, "a time above 0, such as 2 s"),
+        "steps": (1 <= steps <= MOST_STEPS, steps, f"a whole number from 1 to {MOST_STEPS:,}"),
+        "evaluations": (evaluations >= 1, evaluations, "a whole number from 1"),
+        "tolerance": (1e-13 <= tolerance <= 1e-2, tolerance, "a number from 1e-13 to 1e-2"),
+    }
+    wrong = [(key, number, form) for key, (right, number, form) in checks.items() if not right]
+    if wrong:
+        raise MechanismError(Finding(f"{key} cannot be {number:g}", key, f"give {form}") for key, number, form in wrong)
     if steady:
         return steady_result(mechanism, duration, steps, tolerance, progress, evaluations)
     motion, bare = FreeMotion.of(run), None
@@ -146,16 +154,3 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
             break
         best = finer
     return best
-
-
-def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: int) -> None:
-    """MechanismError for numbers that make no sense."""
-    checks = {
-        "duration": (np.isfinite(duration) and duration > 0, duration, "a time above 0, such as 2 s"),
-        "steps": (1 <= steps <= MOST_STEPS, steps, f"a whole number from 1 to {MOST_STEPS:,}"),
-        "evaluations": (evaluations >= 1, evaluations, "a whole number from 1"),
-        "tolerance": (1e-13 <= tolerance <= 1e-2, tolerance, "a number from 1e-13 to 1e-2"),
-    }
-    wrong = [(key, number, form) for key, (right, number, form) in checks.items() if not right]
-    if wrong:
-        raise MechanismError(Finding(f"{key} cannot be {number:g}", key, f"give {form}") for key, number, form in wrong)

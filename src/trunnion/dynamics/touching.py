@@ -333,10 +333,11 @@ def _of_joint(run: Run, name: str) -> Iterator[Contact]:
     clearance, radius = single(play.radii[0]), single(values.get(f"joints.{name}.pin.radius", 0.0))
     restitution = numbers.get("restitution", 1.0)
     law = FRICTION_LAWS[joint_entry.friction.law or "coulomb"] if joint_entry.friction else None
-    if contact.of.rigid:
-        stiffness = 0.0
-    else:
-        stiffness = numbers["stiffness"] if "stiffness" in numbers else _hertz(values, name, radius, radius + clearance)
+    stiffness = 0.0 if contact.of.rigid else numbers.get("stiffness", 0.0)
+    if not (contact.of.rigid or "stiffness" in numbers):
+        keys = ("modulus", "hole_modulus", "poisson_ratio", "hole_poisson_ratio")
+        stated = [single(values[f"joints.{name}.contact.{key}"]) for key in keys]
+        stiffness = hertz_stiffness(radius, radius + clearance, *stated)
     common: dict[str, Any] = {
         "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": numbers.get("exponent", 1.0),
         "factor": contact.of.factor(restitution), "restitution": restitution, "law": law,
@@ -385,8 +386,3 @@ def _in_space(run: Run, name: str, play: shifts.Play, wall: float, common: dict[
     for number, (i, side) in enumerate(itertools.product(play.model.axial, (-1.0, 1.0)), 1):
         entry = {**common, **links, "hole": middle, "clearance": single(play.radii[i]), "law": None, "parameters": {}}
         yield ShoulderContact(label=f"{name}.shoulder_{number}", side=side, **entry)
-
-
-def _hertz(values: Mapping[str, Any], name: str, pin: float, hole: float) -> float:
-    keys = ("modulus", "hole_modulus", "poisson_ratio", "hole_poisson_ratio")
-    return hertz_stiffness(pin, hole, *(single(values[f"joints.{name}.contact.{key}"]) for key in keys))

@@ -12,27 +12,15 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
-from trunnion.dynamics.touching import Closed, Contact, Onset, pushes_of
+from trunnion.dynamics.touching import Closed, Onset, pushes_of
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.system import felt, law_of, law_parameters
 from trunnion.solve.track import carried_on
 
 __all__ = [
-    "CLUTCH",
-    "CONTACT",
-    "WORKS",
-    "Dynamics",
-    "Layout",
-    "Rates",
-    "Seen",
-    "Walks",
-    "beside",
-    "bridged",
-    "kinetic_energy",
-    "potential_energy",
-    "seen",
-    "works_of",
+    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "bridged",
+    "kinetic_energy", "potential_energy", "seen",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -227,7 +215,16 @@ def beside(motion: FreeMotion, at: Moment, second: Sequence[Number] | Array, bac
     """Rates of the controllers' integrals, of the deflections of bristles, ż = v − d(v) z, m/s, of the slip of a
     clutch, and of the works, W. back: the forces; None while everything rests."""
     errors, slips, lost = list[Number](), list[Number](), list[Number]()
-    works = [0.0] * len(WORKS) if back is None else works_of(back, at, motion.contacts)
+    works: list[Number] = [0.0] * len(WORKS)
+    if back is not None:
+        loads, touching = motion.system.mechanism.loads, pushes_of(motion.contacts, back.walk, at.onsets)
+        works = [
+            sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
+            sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
+            sum((state.power for state in back.springs.values()), 0.0),
+            sum((back.losses[joint] for joint in motion.system.joints), 0.0),
+            *([sum((push.loss for _, push in touching), 0.0)] if touching else []),
+        ]
     for i, drive in enumerate(motion.drives.values()):
         speed: Any = at.rate[i]
         if drive.loose(at.now, at.slips):
@@ -247,20 +244,6 @@ def beside(motion: FreeMotion, at: Moment, second: Sequence[Number] | Array, bac
         decay = law.relaxation(slip, **law_parameters(law, motion.values, joint))
         bristles.append(slip - decay * deflection)
     return [*errors, *bristles, *slips, *works, *lost]
-
-
-def works_of(back: Backward, at: Moment, contacts: Sequence[Contact]) -> list[Number]:
-    """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
-    loads = back.walk.system.mechanism.loads
-    powers: list[Number] = [
-        sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
-        sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
-        sum((state.power for state in back.springs.values()), 0.0),
-        sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
-    ]
-    if contacts:
-        powers.append(sum((push.loss for _, push in pushes_of(contacts, back.walk, at.onsets)), 0.0))
-    return powers
 
 
 def kinetic_energy(walk: Forward) -> Number:

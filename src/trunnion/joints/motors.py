@@ -16,16 +16,9 @@ from numpy.typing import NDArray
 from trunnion.algebra.spline import look_up
 
 __all__ = [
-    "MOTORS",
-    "MotorKind",
-    "constant",
-    "control_error",
-    "induction",
-    "linear",
-    "speed_control",
-    "table",
+    "MOTORS", "MotorKind", "constant", "control_error", "induction", "linear", "speed_control", "table",
     "transmitted",
-]
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 # What a motor states, by key, SI; of `points` lists.

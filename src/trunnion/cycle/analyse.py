@@ -21,12 +21,12 @@ from trunnion.results import variables as results
 from trunnion.results.attributes import origin
 from trunnion.results.dataset import Result, driven
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["analyse", "analyse_run", "analysed", "drawable"]
+__all__ = ["analyse", "analysed", "drawable"]
 
 DRAWN = 72  # positions of the curves of points that are drawn
 
@@ -106,17 +106,6 @@ def analysed(
         run, steps, method, progress, selection.margin, engine=engine, wanted=selection.variables, at=time
     )
     return result_of(run, at_positions, selection)
-
-
-@np.errstate(all="ignore")
-def analyse_run(
-    run: Run,
-    steps: int = 360,
-    method: FrictionMethod | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> xr.Dataset:
-    """What `analyse` does, for a mechanism that is prepared."""
-    return result_of(run, positions(run, steps, method, progress)).dataset
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN

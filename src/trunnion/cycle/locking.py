@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trunnion.cycle.analyse import analyse_run
 from trunnion.cycle.locking_course import (
     HELD_AND_DRIVEN,
     NEAR,
@@ -22,7 +21,7 @@ from trunnion.cycle.locking_course import (
 )  # fmt: skip
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scales import scales_of
-from trunnion.cycle.summary import member_units
+from trunnion.cycle.summary import member_units, result_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -72,7 +71,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         run.determinacy.refuse()
     if not 1 <= steps <= MOST_STEPS:
         raise MechanismError(Finding(f"the number of steps is {steps}", "steps", f"give 1 to {MOST_STEPS:,}"))
-    result = analyse_run(run, steps, progress=progress)
+    result = result_of(run, positions(run, steps, progress=progress)).dataset
     time, status = result["time"].values, result["status"].values
     other, multiples = passed(run, run.walk(time).backward(), FrictionMethod()), multiples_at(run, time, MARGIN)
     answered = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)

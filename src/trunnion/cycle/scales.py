@@ -54,40 +54,35 @@ def largest(run: Run, arrays: Mapping[str, NDArray[np.float64]]) -> Scales:
     length = max(size, peak(arrays["point_position"][joints]), peak(arrays["joint_slide"]))
     speed = max(peak(arrays["joint_slide_velocity"]), peak(arrays["point_velocity"][joints]))
     rate = max(peak(arrays["joint_rotation_velocity"]), speed / length) or 1 / (run.cycle.duration or 1.0)
-    forces, torques = _stated_forces(run)
+    forces, torques, sources = _stated(run, length, rate)
     forces.append(peak(arrays["reaction_force"]))
     torques.append(peak(arrays["reaction_moment"]))
     for driver, efforts in zip(mechanism.drivers, arrays["drive_effort"], strict=True):
         (torques if system.turns(driver) else forces).append(peak(efforts))
-    return Scales(length, rate, max(*forces, max(torques) / length, CANCELLED * _sources(run, length, rate)))
+    return Scales(length, rate, max(*forces, max(torques) / length, CANCELLED * sources))
 
 
-def _sources(run: Run, length: float, rate: float) -> float:
-    """The largest force, N, that masses and springs have at the scales of the motion: of such all forces are
-    differences, whose rounding is there where they cancel."""
-    sizes = [0.0]
-    for path, entry in run.system.mechanism.parameter_set.entries.items():
-        if entry.location[0] in ("links", "springs") and path in run.values:
-            lengths, rates, forces = powers_of(entry.kind.unit)
-            if forces == 1.0 and (lengths or rates):
-                with np.errstate(all="ignore"):  # a scale beyond the floats makes no force
-                    scale = np.float64(length) ** -lengths * np.float64(rate) ** -rates
-                    sizes.append(float(np.nan_to_num(peak(primal(run.values[path])) * scale, posinf=0.0)))
-    return max(sizes)
-
-
-def _stated_forces(run: Run) -> tuple[list[float], list[float]]:
-    """Stated forces with the weight of all links that move, N, and stated moments, N m."""
+def _stated(run: Run, length: float, rate: float) -> tuple[list[float], list[float], float]:
+    """Stated forces with the weight of all links that move, N, stated moments, N m, and the largest force, N, that
+    masses and springs have at the scales of the motion: of such all forces are differences, whose rounding is there
+    where they cancel."""
     mechanism, values = run.system.mechanism, run.values
     gravity = float(np.linalg.norm([peak(primal(values.get(f"gravity.{axis}", 0.0))) for axis in "xyz"]))
     masses = [peak(primal(values[f"links.{name}.mass"])) for name in mechanism.links if f"links.{name}.mass" in values]
     resting = {name for name, load in mechanism.loads.items() if load.link == mechanism.fixed_link}
-    sizes = {"N": [gravity * sum(masses)], "N m": [0.0]}
+    sizes, sources = {"N": [gravity * sum(masses)], "N m": [0.0]}, [0.0]
     for path, entry in mechanism.parameter_set.entries.items():
-        rests = entry.location[:1] == ("loads",) and entry.location[1] in resting
-        if entry.kind.unit in sizes and path in values and not rests:
-            sizes[entry.kind.unit].append(peak(primal(values[path])))
-    return sizes["N"], sizes["N m"]
+        if path not in values:
+            continue
+        section, unit = entry.location[0], entry.kind.unit
+        if unit in sizes and not (section == "loads" and entry.location[1] in resting):
+            sizes[unit].append(peak(primal(values[path])))
+        lengths, rates, forces = powers_of(unit) if section in ("links", "springs") else (0, 0, 0)
+        if forces == 1.0 and (lengths or rates):
+            with np.errstate(all="ignore"):  # a scale beyond the floats makes no force
+                scale = np.float64(length) ** -lengths * np.float64(rate) ** -rates
+                sources.append(float(np.nan_to_num(peak(primal(values[path])) * scale, posinf=0.0)))
+    return sizes["N"], sizes["N m"], max(sources)
 
 
 def peak(values: ArrayLike) -> float:

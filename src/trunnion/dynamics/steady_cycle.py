@@ -42,7 +42,7 @@ from trunnion.results.quantities import readable
 from trunnion.results.scales import scales_in
 from trunnion.solve.run import prepare
 
-__all__ = ["Repeated", "UnsteadyError", "motion_law", "steady"]
+__all__ = ["Repeated", "UnsteadyError", "steady"]
 
 Array = NDArray[np.float64]
 
@@ -90,13 +90,6 @@ class Repeated:
         return Span(self.period, True, False, one_way, float(np.max(np.abs(rates))), float(np.ptp(values)))
 
 
-def motion_law(repeated: Repeated) -> MotionLaw:
-    """A motion that repeats as the law of a driver."""
-    return MotionLaw(
-        repeated.at, repeated.span, needs=(), source="motion in time", validity="the mechanism it was found for"
-    )
-
-
 FINER = 1e-2  # of the tolerance of a run-up: that of the cycles that are compared
 LONGER = (1, 4, 16)  # times the duration: how far a run-up goes on if its end leads to no steady cycle
 REPEATED = 1e-8  # of the state: by how much the end of a steady cycle may miss its begin
@@ -141,7 +134,11 @@ def steady(
         raise MechanismError(findings)
     solution, first, residual, factor = _steady_cycle(motion, duration, tolerance, progress, evaluations)
     each, name = Repeated.of(motion, solution), motion.names[first]
-    laws = {driver: motion_law(repeated) for driver, repeated in zip(motion.names, each, strict=True)}
+    source, validity = "motion in time", "the mechanism it was found for"
+    laws = {
+        driver: MotionLaw(repeated.at, repeated.span, needs=(), source=source, validity=validity)
+        for driver, repeated in zip(motion.names, each, strict=True)
+    }
     run = prepare(mechanism.with_motions(laws))
     at = positions(run, steps, engine="numpy")
     cycle, notes = summary.result_of(run, at), list[Finding]()

@@ -307,31 +307,31 @@ def course_of(
     ideal: of the mechanism without errors; names: of the variables, those of the summary if not given.
     """
     names = names or followed(run.system, run.erring and not ideal)
-    return run.once(("course", method, ideal, names), lambda: _course(run, method, ideal, names))
 
+    def looked() -> CycleCourse:
+        looking = _Looking(run, method, ideal, names)
+        accuracy = SEATED if looking.seats else None
+        courses = run.courses(looking, looking.bends(), accuracy, lambda sizes: like(run, looking.shapes, sizes))
+        return CycleCourse(run, looking.shapes, courses)
 
-def _course(run: Run, method: FrictionMethod, ideal: bool, names: tuple[str, ...]) -> CycleCourse:
-    looking = _Looking(run, method, ideal, names)
-    accuracy = SEATED if looking.seats else None
-    courses = run.courses(looking, looking.bends(), accuracy, lambda sizes: like(run, looking.shapes, sizes))
-    return CycleCourse(run, looking.shapes, courses)
+    return run.once(("course", method, ideal, names), looked)
 
 
 def margin_of(run: Run, method: FrictionMethod) -> CycleCourse:
     """The course of the locking margin, NaN where it is beyond what the method looks for, found once."""
-    return run.once(("margin", method), lambda: _margin(run, method))
 
+    def looked() -> CycleCourse:
+        looking = _Looking(run, method, ideal=False, names=())
 
-def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
-    looking = _Looking(run, method, ideal=False, names=())
+        def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+            back, valid = looking.solved(time)
+            status: NDArray[np.integer] = status_of(back, time.shape)
+            margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
+            return margin_rows(margin, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST)))
 
-    def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
-        back, valid = looking.solved(time)
-        status: NDArray[np.integer] = status_of(back, time.shape)
-        margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
-        return margin_rows(margin, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST)))
+        return CycleCourse(run, {"locking_margin": ()}, run.courses(look, looking.bends(), MARGINS))
 
-    return CycleCourse(run, {"locking_margin": ()}, run.courses(look, looking.bends(), MARGINS))
+    return run.once(("margin", method), looked)
 
 
 def margin_rows(margin: Array, status: NDArray[np.integer]) -> tuple[Array, NDArray[np.integer]]:

@@ -1,9 +1,8 @@
 """Where something changes within a step: located on its dense output.
 
-What ends a step - a gap that closes, a joint that comes to rest or breaks away, a clutch that lets go - is a number
-that becomes negative, see `first_crossing`. A motion ends at the end of a driver's range, or where two assemblies of
-the links meet, see `Guards`; of one driver alone these places are known beforehand, and are approached from one side:
-see `integrate`.
+What ends a step - a gap that closes, a joint that comes to rest or breaks away, a clutch that lets go, a place at which
+a force bends - is a number that becomes negative, see `first_crossing`. A motion ends at the end of a driver's range,
+or where two assemblies of the links meet, see `Guards`; of one driver alone these are known beforehand, as bends.
 """
 
 from __future__ import annotations

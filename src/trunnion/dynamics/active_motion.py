@@ -30,7 +30,7 @@ from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seen, kinetic_energy
-from trunnion.dynamics.solution import Event, Impact, Solution, Stretch, over_steps, step_nodes
+from trunnion.dynamics.solution import Impact, Solution, Stretch, over_steps, step_nodes
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset, least_clearance
 
@@ -405,15 +405,12 @@ class ActiveMotion(Integration):
         if onsets[k] is None:
             onsets[k] = max(-rate, SLOWEST)
             self._begin(k, time, max(-rate, 0.0))
-            self._say(time, "impact", k, -rate)
+            self._note(time, "impact", -rate, "m/s", self.motion.contacts[k].label)
         else:
             onsets[k] = None
             self._end(k, time, rate)
         self.mode = self.mode._replace(onsets=tuple(onsets))
         return FIRST * least_clearance(self.motion.contacts) / max(abs(rate), SLOWEST)
-
-    def _say(self, time: float, kind: str, k: int, figure: float) -> None:
-        self.solution.events.append(Event(time, kind, self.motion.contacts[k].label, figure, "m/s"))
 
     def _begin(self, k: int, time: float, approach: float = 0.0) -> None:
         """A contact begins that lasts."""
@@ -424,7 +421,7 @@ class ActiveMotion(Integration):
         """A contact lifts off."""
         impact = self._open.pop(k)
         impact.end, impact.separation = time, rate
-        self._say(time, "lift-off", k, rate)
+        self._note(time, "lift-off", rate, "m/s", impact.label)
 
     # ---- what holds, slips and is open ------------------------------------------------------------------------
 
@@ -457,9 +454,9 @@ class ActiveMotion(Integration):
             for k in case.may:
                 was, joint = before[k] if before else None, self.motion.resisted[k]
                 if case.senses[k] == 0 and was != 0:
-                    self.solution.events.append(Event(time, "stick", joint))
+                    self._note(time, "stick", of=joint)
                 elif case.senses[k] != 0 and not was:
-                    self.solution.events.append(Event(time, "break-away", joint, float(case.senses[k])))
+                    self._note(time, "break-away", float(case.senses[k]), of=joint)
             self._rests(time, row, sticks)
         return True
 
@@ -513,7 +510,7 @@ class ActiveMotion(Integration):
         energy = self._stopped(time, row, locked.rate)
         for k in locked.joints:  # the whole loss is told once
             figure = energy if k == locked.joints[0] else np.nan
-            self.solution.events.append(Event(time, "lock", self.motion.resisted[k], figure, "J"))
+            self._note(time, "lock", figure, "J", self.motion.resisted[k])
         self.mode = self.mode._replace(senses=locked.senses)
         return True
 

@@ -28,7 +28,7 @@ from trunnion.dynamics.active_motion import ActiveMotion, RowMode, RowModes, set
 from trunnion.dynamics.bordered import nearest
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics
-from trunnion.dynamics.solution import Event, Impact
+from trunnion.dynamics.solution import Impact
 from trunnion.dynamics.start import Places, load_times
 from trunnion.dynamics.state import FreeMotion, Linear, Mode, Moment
 from trunnion.dynamics.touching import Closed, Onset, least_clearance
@@ -306,7 +306,7 @@ class ImpactMotion(ActiveMotion):
                 self.solution.impacts.append(
                     Impact(label, time, approach, time, rate, force=np.nan, wear=wear, impulse=normal)
                 )
-                self._say(time, "impact", k, approach)
+                self._note(time, "impact", approach, "m/s", label)
         self._set({k: closed.get(k) for k in places})
         if self.mode.senses:
             self._torn(time, row)
@@ -319,9 +319,7 @@ class ImpactMotion(ActiveMotion):
         for k, speed in enumerate(self.motion.ways(self.moment(time, row))[1]):
             if abs(speed) > SLOW and np.sign(speed) != senses[k]:
                 if senses[k] == 0:
-                    self.solution.events.append(
-                        Event(time, "break-away", self.motion.resisted[k], float(np.sign(speed)))
-                    )
+                    self._note(time, "break-away", float(np.sign(speed)), of=self.motion.resisted[k])
                 senses[k] = int(np.sign(speed))
         self.mode = self.mode._replace(senses=tuple(senses))
 
@@ -336,7 +334,7 @@ class ImpactMotion(ActiveMotion):
                 self._end(k, time, 0.0)
             elif onsets[k] is not None and k not in self._open:
                 self._begin(k, time + self.pauses.get(k, 0.0))
-                self._say(self._open[k].begin, "closes", k, np.nan)
+                self._note(self._open[k].begin, "closes", unit="m/s", of=self._open[k].label)
         self.pauses = {}
 
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:

@@ -194,8 +194,9 @@ class Integration(ABC):
     def end(self, code: str, time: float, figures: dict[str, Any] | None = None) -> None:
         self.solution.ended = Ended(f"simulate.{code}", time, figures or {})
 
-    def _note(self, time: float, kind: str, figure: float = np.nan, unit: str = "") -> None:
-        self.solution.events.append(Event(time, kind, self.motion.names[0], figure, unit))
+    def _note(self, time: float, kind: str, figure: float = np.nan, unit: str = "", of: str = "") -> None:
+        """Take down an event. of: what it happens to, the first free driver if not given."""
+        self.solution.events.append(Event(time, kind, of or self.motion.names[0], figure, unit))
 
     def _crossing(self, stretch: Stretch) -> Crossing | None:
         """The first change within a step."""

@@ -69,18 +69,15 @@ class Causes:
             worst = np.argmax(conditions, axis=0)
             for number in range(len(conditions)):
                 self.keep("singular", number, (status == Status.SINGULAR) & (worst == number), places)
-        if np.any(status == Status.NOT_ASSEMBLED):
-            self._note_open(back.walk, status, places)
-
-    def _note_open(self, walk: Forward, status: NDArray[np.int8], places: Positions) -> None:
-        """The first module of each unassembled position that does not close, and by how much."""
         left = status == Status.NOT_ASSEMBLED
-        for number, pose in enumerate(walk.poses):
+        for number, pose in enumerate(back.walk.poses):  # the first module that does not close, and by how much
+            if not np.any(left):
+                break
             bad = np.zeros(status.shape, bool)
             for frame in pose.frames:
                 bad |= ~np.isfinite(np.broadcast_to(_sum(frame), status.shape))
             if np.any(bad & left):
-                reasons = _shortfalls(walk, number)
+                reasons = _shortfalls(back.walk, number)
                 sizes = np.array([np.broadcast_to(size, status.shape) for size in reasons.values()])
                 self.keep("open", (number, *reasons), bad & left, places, sizes.reshape(len(reasons), len(places)))
             left = left & ~bad

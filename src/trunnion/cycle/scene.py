@@ -43,6 +43,11 @@ def scene_of(run: Run) -> dict[str, Any]:
             axis = elements[links[0], name]
             joints[name]["axis"] = [float(axis.c), float(axis.s)]
     teeth = [name for name, gear in mechanism.gears.items() if gear.touches and not spatial]
+    # what each measure of the model is of, in words: "slide of S", "effort of A"
+    measures = {
+        name: f"{entry.kind.replace('_', ' ')} of {entry.subject}{f'.{entry.axis}' if entry.axis else ''}"
+        for name, entry in mechanism.measures.items()
+    }
     spinning = [spin for module in system.plan.modules for spin in module.spinning]
     return {
         "space": mechanism.space,
@@ -57,17 +62,8 @@ def scene_of(run: Run) -> dict[str, Any]:
         },
         "gears": {name: pitch_circles(system, values, name) for name in teeth},
         "plays": plays,
-        **({"measures": measured} if (measured := _measured(run)) else {}),
+        **({"measures": measures} if measures else {}),
         **({"passive": [{"link": link, "joints": [a, b]} for link, a, b in spinning]} if spatial else {}),
-    }
-
-
-def _measured(run: Run) -> dict[str, str]:
-    """What each measure of the model is of, in words: "slide of S", "effort of A"."""
-    measures = run.system.mechanism.measures.items()
-    return {
-        name: f"{entry.kind.replace('_', ' ')} of {entry.subject}{f'.{entry.axis}' if entry.axis else ''}"
-        for name, entry in measures
     }
 
 

@@ -13,7 +13,7 @@ from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, quantity
 from trunnion.results.scales import without_noise
-from trunnion.views.axis import Array, abscissa, column, is_spatial, layout, members, names, numbers
+from trunnion.views.axis import Array, abscissa, column, is_spatial, layout, members, names, numbers, series
 from trunnion.views.bodies import Space, gathered
 from trunnion.views.curves import peak
 from trunnion.views.page import NONE
@@ -210,7 +210,6 @@ def loss_rows(result: xr.Dataset) -> list[Row]:
 
 # ---- for the browser ------------------------------------------------------------------------------------------------
 
-DIGITS = 5
 FAR, LEANT = 0.06, 0.2  # what is offered: the largest error of place as this share of the size, or of angle, rad
 MOST = 1000.0
 SLIGHT = 1e-3  # a stretch of less than this share of the largest error of place is not told
@@ -226,15 +225,19 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
     places = np.concatenate(tracks or [np.empty((0, 2))])
     places = places[np.isfinite(places).all(axis=1)]
     size = bodies.size if bodies else float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    # the magnification at which errors are well seen and links are still where one looks for them: 1, 2 or 5 times 10ⁿ
+    far, turned = peak(*point_errors(result).values()), peak(result["link_error"].values)
+    most = min(FAR * size / far if far else np.inf, LEANT / turned if turned else np.inf, MOST)
+    steps = [step * base for base in (1.0, 10.0, 100.0, 1000.0) for step in (1.0, 2.0, 5.0)]
     return {
-        "preset": _preset(result, size),
+        "preset": max([step for step in steps if step <= most * (1 + 1e-9)], default=1.0),
         "points": {} if spatial else {key: _vector(error) for key, error in points.items()},
         "links": _moved(result, bodies) if bodies
-        else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
-        "worst": [{"label": key, "values": _series(values)} for key, values in worst_points(result).items()],
+        else {link: series(error) for link, error in members(result, "link_error", "link").items()},
+        "worst": [{"label": key, "values": series(values)} for key, values in worst_points(result).items()],
         "outputs": [
             {"label": text, "unit": "°" if unit == "rad" else "m",
-             "values": _series(np.degrees(error) if unit == "rad" else error)}
+             "values": series(np.degrees(error) if unit == "rad" else error)}
             for text, unit, error in outputs(result).values()
         ],
         "lost": lost,
@@ -247,31 +250,15 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         ],
         # β and ξ of the pins, °, with the positions before which they jump
         "angles": [
-            {"sign": sign, "joint": joint, "values": _series(values),
+            {"sign": sign, "joint": joint, "values": series(values),
              "breaks": np.flatnonzero(np.abs(np.diff(values, prepend=values[-1:])) > JUMP).tolist()}
             for sign, joint, values in seat_angles(result)
         ],
     }  # fmt: skip
 
 
-def _series(values: Array) -> list[float | None]:
-    """Five digits of a series; one number if it never changes."""
-    rounded = [None if value is None else float(f"{value:.{DIGITS}g}") for value in numbers(values)]
-    return rounded[:1] if rounded and all(value == rounded[0] for value in rounded) else rounded
-
-
 def _vector(values: Array) -> dict[str, list[float | None]]:
-    return {axis: _series(part) for axis, part in zip("xyz", values, strict=False)}
-
-
-def _preset(result: xr.Dataset, size: float) -> float:
-    """A round magnification at which the errors are well seen and the links are still where one looks for them."""
-    far, turned = peak(*point_errors(result).values()), peak(result["link_error"].values)
-    most = min(FAR * size / far if far else np.inf, LEANT / turned if turned else np.inf, MOST)
-    if not most > 1:
-        return 1.0
-    base = 10.0 ** np.floor(np.log10(most))
-    return float(max(factor * base for factor in (1.0, 2.0, 5.0) if factor * base <= most * (1 + 1e-9)))
+    return {axis: series(part) for axis, part in zip("xyz", values, strict=False)}
 
 
 def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
@@ -296,12 +283,8 @@ def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
             name = key.split(".", 1)[1]
             joint = bodies.joints.get(name, {"links": ()})
             seat = bodies.seat(name, joint["links"].index(link)) if link in joint["links"] else places[key]
-            rows.append(
-                {"at": [float(f"{value:.7g}") for value in seat], "by": [float(f"{value:.5g}") for value in by]}
-            )
-        stretched = max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest
-        moved[link] = {
-            "about": [float(f"{value:.7g}") for value in about], "shift": _vector(shift),
-            "turn": _vector(turns[link]), "stretch": rows if stretched else [],
-        }  # fmt: skip
+            rows.append({"at": numbers(seat), "by": numbers(by)})
+        stretched = max(peak(np.array(row["by"])) for row in rows) > SLIGHT * largest
+        moved[link] = {"about": numbers(about), "shift": _vector(shift), "turn": _vector(turns[link]),
+                       "stretch": rows if stretched else []}  # fmt: skip
     return moved

@@ -22,7 +22,7 @@ from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.views.axis import Array, layout, members
+from trunnion.views.axis import Array, layout, members, numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -237,9 +237,8 @@ class Solid:
 
     def data(self) -> dict[str, Any]:
         """As JSON, with seven digits."""
-        points = [[float(f"{value:.7g}") for value in point] for point in self.points.tolist()]
-        return {"kind": self.kind, "link": self.link, "points": points, "radius": float(f"{self.radius:.7g}"),
-                "paint": self.paint}  # fmt: skip
+        return {"kind": self.kind, "link": self.link, "points": [numbers(point) for point in self.points],
+                "radius": numbers(np.array([self.radius]))[0], "paint": self.paint}  # fmt: skip
 
 
 def solids(bodies: Space) -> list[Solid]:

@@ -111,18 +111,15 @@ def page(
     """
     text = said(result, web_text("report.css") + web_text("page.css"))
     text["findings"] = [row for row in text["findings"] if row not in missed]
-    drawn = [[{**asdict(replace(part, pictures=())), "pictures": _drawn(result, part)} for part in some]
-             for some in (parts, end)]  # fmt: skip
+    drawn = [[{**asdict(replace(part, pictures=())),
+               "pictures": [{"alt": alt, "source": source(result, plot)} for alt, plot in part.pictures]}
+              for part in some] for some in (parts, end)]  # fmt: skip
     return template("page.html.j2").render(
         kicker=kicker, name=name or str(result.attrs.get("name", "")) or "Mechanism",
         formula=str(result.attrs.get("formula", "")), facts=facts, summary=summary, missed=missed,
         sections=drawn[0], end=drawn[1], inputs=inputs_of(result) if "inputs" in result.attrs else [],
         about_data=about_data, signed=signed, **text,
     )  # fmt: skip
-
-
-def _drawn(result: xr.Dataset, part: Section) -> list[dict[str, str]]:
-    return [{"alt": alt, "source": source(result, plot)} for alt, plot in part.pictures]
 
 
 def source(result: xr.Dataset, plot: Plot) -> str:

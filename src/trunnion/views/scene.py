@@ -192,24 +192,21 @@ def _in_space(result: xr.Dataset) -> dict[str, Any]:
     if not drawn:
         return parts
     around, above = best(bodies)
+    picture = scenery(bodies, looking(around, above))
     # where a joint's symbol sits on its second link and along which axes: none of a ball or a weld
     for name, joint in bodies.joints.items():
         pair, sides = PAIRS[joint["type"]], list(enumerate(joint["links"]))
         sides = sides if pair.crossed else sides[1:] if pair.one_axis or pair.angle else []
-        axes = [{"link": link, "along": _vector(bodies.element(name, side)[1])} for side, link in sides]
-        seats[name] = {"link": joint["links"][1], "at": _vector(bodies.seat(name)), "axes": axes,
+        axes = [{"link": link, "along": numbers(bodies.element(name, side)[1])} for side, link in sides]
+        seats[name] = {"link": joint["links"][1], "at": numbers(bodies.seat(name)), "axes": axes,
                        "ends": _ends(result, bodies, name)}  # fmt: skip
     return parts | {
-        "size": _vector([bodies.size])[0], "scaled": bool(bodies.extent), "middle": _vector(bodies.middle),
-        "view": {"around": around, "above": above, "box": _vector(scenery(bodies, looking(around, above)).box)},
-        "solids": [solid.data() for solid in scenery(bodies, looking(around, above)).solids],
-        "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in bodies.free.items()],
+        "size": numbers(np.array([bodies.size]))[0], "scaled": bool(bodies.extent), "middle": numbers(bodies.middle),
+        "view": {"around": around, "above": above, "box": numbers(np.array(picture.box))},
+        "solids": [solid.data() for solid in picture.solids],
+        "free": [{"key": key, "link": key.split(".", 1)[0], "at": numbers(at)} for key, at in bodies.free.items()],
         "seats": seats, "loads": _loads_in_space(bodies), "apart": any(bodies.shifts.values()),
     }  # fmt: skip
-
-
-def _vector(values: Any) -> list[float]:
-    return [float(f"{float(value):.7g}") for value in values]
 
 
 def _ends(result: xr.Dataset, bodies: Space, name: str) -> list[dict[str, Any]]:
@@ -221,7 +218,7 @@ def _ends(result: xr.Dataset, bodies: Space, name: str) -> list[dict[str, Any]]:
     solid = [] if ends is None else [end for end in ends if np.isfinite(end).any()]
     return [
         {"link": bodies.joints[name]["links"][order // 2],
-         "along": _vector((1.0 if order % 2 else -1.0) * bodies.element(name, order // 2)[1]),
+         "along": numbers((1.0 if order % 2 else -1.0) * bodies.element(name, order // 2)[1]),
          "force": {axis: series(part) for axis, part in zip("xyz", end, strict=True)}}
         for order, end in enumerate(solid if len(solid) in (2, 4) else [])
     ]  # fmt: skip
@@ -241,7 +238,7 @@ def _loads_in_space(bodies: Space) -> list[dict[str, Any]]:
         if at is None and load.get("at") is None and seats:
             at = np.mean(list(seats.values()), axis=0)
         if at is not None:
-            rows.append({"name": name, "link": link, "at": _vector(at), "force": load.get("force") or [0.0, 0.0, 0.0],
+            rows.append({"name": name, "link": link, "at": numbers(at), "force": load.get("force") or [0.0, 0.0, 0.0],
                          "moment": load.get("moment") or [0.0, 0.0, 0.0], "frame": load.get("frame", "global"),
                          "varies": bool(load.get("varies")), "useful": bool(load.get("useful"))})  # fmt: skip
     return rows

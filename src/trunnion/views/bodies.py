@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
@@ -267,13 +268,17 @@ def _body(bodies: Space, link: str) -> list[Solid]:
     sides = {name: joint["links"].index(link) for name, joint in bodies.joints.items() if link in joint["links"]}
     seats = {name: bodies.seat(name, side) for name, side in sides.items()}
     shapes, forked = _of_cardan(bodies, link, sides), set[str]()
-    for first, two in [] if shapes else _tree(seats):
+    joints, places = list(seats), np.array(list(seats.values())).reshape(-1, 3)
+    gaps = np.linalg.norm(places[:, None] - places, axis=2) + np.finfo(float).tiny  # 0 would be no edge
+    for i, k in [] if shapes else np.transpose(minimum_spanning_tree(gaps).nonzero()):
+        first, two = joints[i], joints[k]
         route = np.array(_route(bodies, (first, sides[first]), (two, sides[two])))
         for name, end, direction in ((first, 0, route[1] - route[0]), (two, -1, route[-2] - route[-1])):
-            route[end] += _clear(bodies, name, sides[name], direction)
-            if PAIRS[bodies.joints[name]["type"]].body == "cross" and name not in forked:
-                forked.add(name)
-                shapes += _fork(bodies, link, bodies.element(name, sides[name])[1], seats[name], route[end])
+            if PAIRS[bodies.joints[name]["type"]].body == "cross":  # it meets its fork; others hide in their symbols
+                route[end] += direction * min(FORK * bodies.size / max(float(np.linalg.norm(direction)), 1e-300), 1 / 3)
+                if name not in forked:
+                    forked.add(name)
+                    shapes += _fork(bodies, link, bodies.element(name, sides[name])[1], seats[name], route[end])
         if np.linalg.norm(np.diff(route, axis=0), axis=1).min() > 1e-6 * bodies.size:
             shapes.append(Solid("rod", link, route, BAR * bodies.size, link))
     for key, place in bodies.free.items():
@@ -327,30 +332,6 @@ def _of_cardan(bodies: Space, link: str, sides: dict[str, int]) -> list[Solid]:
     prongs = [Solid("rod", link, np.array(_arc(start, end, centre, middle)), BAR * size, link) for end in ends]
     eye = _rod(link, ends[1] - HALF * size * axis, ends[1] + HALF * size * axis, SLEEVE * size)
     return [*prongs, eye]
-
-
-def _clear(bodies: Space, name: str, side: int, direction: Array) -> Array:
-    """How far a rod that leaves a joint starts from its middle, so that it meets its symbol from outside."""
-    body, length = PAIRS[bodies.joints[name]["type"]].body, float(np.linalg.norm(direction))
-    radius = {"ball": 0.85 * BALL, "rail": 0.9 * BLOCK, "cube": 0.02}.get(body, 0.0)
-    if body == "cross":
-        return direction * min(FORK * bodies.size / length, 1 / 3) if length > 0 else direction
-    if body == "sleeve":
-        across = abs(float(direction @ bodies.element(name, side)[1])) < 0.5 * length
-        radius = 0.85 * SLEEVE if across else 0.0
-    return direction * (radius * bodies.size / length) if length > 3 * radius * bodies.size > 0 else 0.0 * direction
-
-
-def _tree(seats: dict[str, Array]) -> list[tuple[str, str]]:
-    """Edges of the shortest tree through the places, by Prim's algorithm."""
-    names = list(seats)
-    inside, edges = names[:1], []
-    while len(inside) < len(names):
-        pairs = [(first, two) for first in inside for two in names if two not in inside]
-        best = min(pairs, key=lambda pair: float(np.linalg.norm(seats[pair[0]] - seats[pair[1]])))
-        edges.append(best)
-        inside.append(best[1])
-    return edges
 
 
 def _route(bodies: Space, first: tuple[str, int], two: tuple[str, int]) -> list[Array]:

@@ -192,16 +192,12 @@ def _described(description: str, alias: str | None = None) -> Any:
     return Field(default=None, alias=alias, description=description)
 
 
-def _key(kind: MeasureKind) -> Any:
-    """The field of a kind: a name, or one of its words."""
-    words: Any = str if isinstance(kind.of, str) else Literal[kind.of]
-    return words | None, _described(kind.text)
-
-
 if TYPE_CHECKING:
     _Subject = Part
-else:
-    _Subject = create_model("_Subject", __base__=Part, **{key: _key(kind) for key, kind in MEASURES.items()})
+else:  # a key for each kind: a name, or one of its words
+    of = {key: str if isinstance(kind.of, str) else Literal[kind.of] for key, kind in MEASURES.items()}
+    keys = {key: (of[key] | None, _described(kind.text)) for key, kind in MEASURES.items()}
+    _Subject = create_model("_Subject", __base__=Part, **keys)
 
 
 class Measure(_Subject):

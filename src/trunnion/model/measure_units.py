@@ -17,7 +17,7 @@ from trunnion.model.rules import faults
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
 __all__ = [
-    "course_kind", "dimension_kinds", "drive_kind", "expression_findings", "figure_kind", "is_place", "operands",
+    "course_kind", "dimension_kinds", "drive_kind", "expression_findings", "is_place", "operands",
     "place_kind",
 ]  # fmt: skip
 
@@ -51,27 +51,14 @@ def is_place(measure: Measure) -> bool:
     return (measure.statistic or "").startswith("place-of-") or measure.kind == "dead_centre"
 
 
-def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
-    """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate.
-
-    A driver that does not run one way passes a coordinate twice: its places are times, which `place_kind` tells.
-    """
-    if is_place(measure):
-        return drive_kind(mechanism)
-    if measure.statistic == "dwell" or measure.kind == "time_ratio":
-        return KINDS["number"]
-    return course_kind(mechanism, measure)
-
-
 def course_kind(mechanism: Fields, measure: Measure) -> Kind:
     """What a measure is at every position; of a joint with two motions the rotation."""
     if not measure.kind:  # a finding of its own
         return ANY
     if measure.kind == "expression":
         with suppress(UnitError, KeyError):  # findings of their own
-            return _of_dimension(
-                measure.formula.dimension(_dimensions(mechanism, measure)) if measure.formula else None
-            )
+            formula = measure.formula
+            return _of_dimension(formula.dimension(_dimensions(mechanism, measure)) if formula else None)
         return ANY
     both = MEASURES[measure.kind].quantities
     return both[-1 if slides(mechanism, measure) else 0]
@@ -126,12 +113,9 @@ def _dimensions(mechanism: Fields, measure: Measure) -> dict[str, Dimension | No
     of_dimensions = dimension_kinds(mechanism)
     kinds: dict[str, Dimension | None] = {}
     for name, part in operands(mechanism, measure).items():
-        if part is not None:
-            kind = course_kind(mechanism, part)
-        elif name in mechanism.dimensions:
-            kind = of_dimensions.get(name, ANY)
-        else:
+        if part is None and name not in mechanism.dimensions:
             raise KeyError(name)
+        kind = of_dimensions.get(name, ANY) if part is None else course_kind(mechanism, part)
         kinds[name] = next(iter(kind.dimensions), None)
     return kinds
 

@@ -24,7 +24,7 @@ from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.fields import Fields
 from trunnion.model.joint_parts import Contact, Friction, Joint, Losses, freedoms
 from trunnion.model.limits import Limits
-from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, figure_kind, is_place, place_kind
+from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import AT, Driver, Gear, Point
@@ -154,7 +154,8 @@ def _kind_in_place(mechanism: Fields, section: str, part: Any, turns: bool | Non
         if key == "within":
             return course_kind(mechanism, part)
         if key not in ("at", "over") and not is_place(part):
-            return figure_kind(mechanism, part)
+            shares = part.statistic == "dwell" or part.kind == "time_ratio"
+            return KINDS["number"] if shares else course_kind(mechanism, part)
         kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
         return place_kind(mechanism, entry.quantity, {name: kind.dimensions[0] for name, kind in kinds.items()})
     if section == "tables":

@@ -194,13 +194,12 @@ class Varying(Numbers):
                 option = getattr(defaults, key, None)
             if option is not None:
                 options[key] = tuple(map(value, option)) if isinstance(option, tuple) else value(option)
-        sample = options.get("values")
         lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
         if variation.limits is not None:
             lower, upper = value(variation.limits.lower), value(variation.limits.upper)
         elif written_limits is not None:
             lower, upper = written_limits
-        elif isinstance(sample, tuple):
+        elif isinstance(sample := options.get("values"), tuple):
             lower, upper = min(sample), max(sample)
         direction = towards(entry.path, numbers.entries) if variation.direction else ""
         return Tolerance(entry.path, float(numbers.nominal[entry.path]), lower, upper, distribution, options, direction)

@@ -30,13 +30,8 @@ MOST_LINKS = 40  # one to the other, as operating systems have it
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin)|(stdout)|(stderr)|fd/(\d+))|/proc/(?:self|\d+)/fd/(\d+)")
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-UMASK = _umask()  # read once: reading it means setting it, for the whole process
+UMASK = os.umask(0)  # read once: reading it means setting it, for the whole process
+os.umask(UMASK)
 
 
 # ---- what is read and what is written -------------------------------------------------------------------------

@@ -162,18 +162,12 @@ def slider(seat: Data) -> xr.Dataset:
     return trunnion.analyse(
         trunnion.Mechanism(
             links={"ground": {"points": {"S": axis}}, "slider": {"points": {"S": axis}}},
-            joints={
-                "S": {
-                    "type": "prismatic",
-                    "links": ["ground", "slider"],
-                    "guide": {"length": LENGTH, "clearance": RHO},
-                    "seat": seat,
-                }
-            },
+            joints={"S": {"type": "prismatic", "links": ["ground", "slider"], "seat": seat,
+                          "guide": {"length": LENGTH, "clearance": RHO}}},
             drivers={"S": {"speed": 1.0, "range": [0.0, 0.1]}},
         ),
         steps=2,
-    )
+    )  # fmt: skip
 
 
 def test_guide() -> None:

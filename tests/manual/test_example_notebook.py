@@ -13,8 +13,9 @@ import pytest
 NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebook.ipynb"
 
 
-def executed() -> list[dict[str, Any]]:
-    """The code cells after a run of all of them from the top, in a kernel of their own."""
+@pytest.fixture(scope="module")
+def shown() -> dict[str, dict[str, Any]]:
+    """By the last line of a code cell what it shows, by media type, after a run of all in a kernel of their own."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the notebook's own machinery
         import nbformat
@@ -24,19 +25,12 @@ def executed() -> list[dict[str, Any]]:
         own = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # that of notebooks
         client = NotebookClient(book, timeout=300, resources={"metadata": {"path": str(NOTEBOOK.parent)}})
         client.execute(env=own)
-    return [cell for cell in book.cells if cell.cell_type == "code"]
-
-
-@pytest.fixture(scope="module")
-def shown() -> dict[str, dict[str, Any]]:
-    """By the last line of a cell, what it shows by its media type."""
     found: dict[str, dict[str, Any]] = {}
-    for cell in executed():
-        data: dict[str, Any] = {}
-        for output in cell.outputs:
-            assert output.output_type in ("execute_result", "display_data"), output
-            data |= output.data
-        found[cell.source.splitlines()[-1]] = data
+    for cell in (cell for cell in book.cells if cell.cell_type == "code"):
+        assert {output.output_type for output in cell.outputs} <= {"execute_result", "display_data"}, cell
+        found[cell.source.splitlines()[-1]] = {
+            kind: data for output in cell.outputs for kind, data in output.data.items()
+        }
     return found
 
 

@@ -91,18 +91,18 @@ def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
     def hints() -> dict[str, Any]:
         """What the annotations mean where the function stands; nothing said is anything."""
         place, none = inspect.unwrap(function).__globals__, inspect.Parameter.empty
-        stated = {name: parameter.annotation for name, parameter in parameters.items()}
+        annotations = {name: parameter.annotation for name, parameter in parameters.items()}
         return {name: Any if hint is none else eval(hint, place) if isinstance(hint, str) else hint
-                for name, hint in stated.items()}  # fmt: skip
+                for name, hint in annotations.items()}  # fmt: skip
 
     @functools.wraps(function)
     def strict(*args: Any, **keywords: Any) -> Any:
         if closed:
             check_keywords(f"{call}()", keywords, [name for name in names if name not in ("self", "cls")])
-        stated = {**dict(zip(names, args, strict=False)), **keywords}
-        taken = {name: held(call, name, value, hints().get(name, Any)) for name, value in stated.items()}
-        return function(*[taken[name] for name in names[: len(args)]], *args[len(names) :],
-                        **{name: taken[name] for name in keywords})  # fmt: skip
+        values = {**dict(zip(names, args, strict=False)), **keywords}
+        checked = {name: held(call, name, value, hints().get(name, Any)) for name, value in values.items()}
+        return function(*[checked[name] for name in names[: len(args)]], *args[len(names) :],
+                        **{name: checked[name] for name in keywords})  # fmt: skip
 
     return strict
 

@@ -60,9 +60,9 @@ def with_points(
     these, the file of the data, whose drivers and tables name files in its folder. MechanismError with every finding:
     about a name where it stands in the model, about the content with file and line.
     """
-    own = {f"{section}.{key}": file for section, key, file in stated_files(data)} if model else {}
+    named_files = {f"{section}.{key}": file for section, key, file in stated_files(data)} if model else {}
     changed, read, findings = dict(data), list[TablePoints](), list[Finding]()
-    for name, file in (files or own).items():
+    for name, file in (files or named_files).items():
         try:
             section, key = _holder(data, name)
             entry, where = changed[section][key], f"{section}.{key}"
@@ -71,7 +71,7 @@ def with_points(
                 path, label, columns = _own_path(entry, where, model), str(model.parent / file), entry.get("columns")
                 size = path.stat().st_size + sum(Path(points.file).stat().st_size for points in read)
                 rows = sum(len(points.rows) for points in read)
-                if len(own) > MOST_FILES or size > MAX_BYTES or rows > MAX_OWN_ROWS:
+                if len(named_files) > MOST_FILES or size > MAX_BYTES or rows > MAX_OWN_ROWS:
                     what = f"the files that the model names are too many or too long: more than {MOST_FILES} files, "
                     what += f"over {MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
                     findings.append(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))

@@ -28,7 +28,7 @@ from trunnion.model.csv_table import TableFiles, place_findings, read_text, with
 
 __all__ = [
     "Lines", "composed", "entries_of", "place", "placed", "read_entries", "read_model", "text_of",
-    "version_findings", "write_model", "yaml_writer",
+    "version_findings", "write_model",
 ]  # fmt: skip
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
@@ -116,28 +116,18 @@ def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
     if kind == "TOML":
         raise MechanismError(Finding("TOML is read but not written", file=str(path), remedy="write .yaml or .json"))
     with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
-        if kind == "JSON":
-            json.dump(data, stream, indent=2, ensure_ascii=False)
-            stream.write("\n")
-        else:
-            yaml_writer().dump(data, stream)
+        stream.write(json.dumps(data, indent=2, ensure_ascii=False) + "\n" if kind == "JSON" else text_of(data))
 
 
 def text_of(data: Mapping[str, Any]) -> str:
-    """The plain data of a model as YAML."""
-    stream = StringIO()
-    yaml_writer().dump(data, stream)
-    return stream.getvalue()
-
-
-def yaml_writer() -> YAML:
-    """What writes plain data: the innermost groups on one line."""
-    yaml = YAML(typ="safe", pure=True)
+    """The plain data of a model as YAML, the innermost groups on one line."""
+    yaml, stream = YAML(typ="safe", pure=True), StringIO()
     yaml.default_flow_style = None
     yaml.allow_unicode = True
     yaml.width = 110
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
-    return yaml
+    yaml.dump(data, stream)
+    return stream.getvalue()
 
 
 def version_findings(data: Mapping[str, Any]) -> list[Finding]:

@@ -17,7 +17,7 @@ from trunnion.model.rules import faults
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
 __all__ = [
-    "course_kind", "dimension_kinds", "drive_kind", "expression_findings", "is_place", "operands",
+    "course_kind", "dimension_kinds", "drive_kind", "expression_findings", "operands",
     "place_kind",
 ]  # fmt: skip
 
@@ -44,11 +44,6 @@ def drive_kind(mechanism: Fields) -> Kind:
     """What the coordinate of the first driver measures."""
     joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
     return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
-
-
-def is_place(measure: Measure) -> bool:
-    """Whether a measure gives a position: a dead centre, or where something is largest or smallest."""
-    return (measure.statistic or "").startswith("place-of-") or measure.kind == "dead_centre"
 
 
 def course_kind(mechanism: Fields, measure: Measure) -> Kind:

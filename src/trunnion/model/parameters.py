@@ -24,7 +24,7 @@ from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.fields import Fields
 from trunnion.model.joint_parts import Contact, Friction, Joint, Losses, freedoms
 from trunnion.model.limits import Limits
-from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, is_place, place_kind
+from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import AT, Driver, Gear, Point
@@ -153,7 +153,8 @@ def _kind_in_place(mechanism: Fields, section: str, part: Any, turns: bool | Non
             return KINDS["time"] if key == "duration" else entry.kind
         if key == "within":
             return course_kind(mechanism, part)
-        if key not in ("at", "over") and not is_place(part):
+        of_place = part.kind == "dead_centre" or (part.statistic or "").startswith("place-of-")
+        if key not in ("at", "over") and not of_place:
             shares = part.statistic == "dwell" or part.kind == "time_ratio"
             return KINDS["number"] if shares else course_kind(mechanism, part)
         kinds = dimension_kinds(mechanism) if entry.quantity.names else {}

@@ -222,7 +222,9 @@ def _spellings() -> dict[str, tuple[str, str, str]]:
         first, definition, last = (part.strip() for part in line.split("|"))
         symbols, words = dict(_SYMBOL.findall(first)), last.split()
         name = next(iter(symbols), "") or words[0].strip("*")
-        prefixed = {f"{before}{symbol}": before for symbol, prefixes in symbols.items() for before in _before(prefixes)}
+        # micro has two signs in Unicode, and none on most keyboards
+        prefixed = {f"{before}{symbol}": before for symbol, prefixes in symbols.items()
+                    for before in ("", *prefixes.replace("µ", "µ μ u").split())}  # fmt: skip
         for word in words:
             metric = ("", "micro", "milli", "kilo", "mega") if word.endswith("*") else ("",)
             prefixed |= {f"{before}{word.strip('*')}{end}": before for before in metric for end in ("", "s")}
@@ -240,11 +242,6 @@ def _named(word: str) -> Root:
     factor, exponents, _names = _product(product or "1")[0]
     size = Fraction(_PREFIXES[before]) * Fraction(number or 1) * factor
     return size, exponents if definition else {name: Fraction(1)}, frozenset({name})
-
-
-def _before(prefixes: str) -> list[str]:
-    """The prefixes of a symbol, none among them; micro has two signs in Unicode, and none on most keyboards."""
-    return ["", *(sign for prefix in prefixes.split() for sign in (("µ", "μ", "u") if prefix == "µ" else (prefix,)))]
 
 
 # ---- reading --------------------------------------------------------------------------------------------------

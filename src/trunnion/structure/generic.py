@@ -126,15 +126,15 @@ def fault(
         for constraint, body in determines.items():
             of_link.setdefault(body, []).append(constraint)
         for links in parts:
-            own = [constraint for link in links for constraint in of_link[link]]
-            meshed = {name: gears[name] for name, number in own if number == GEAR}
-            named = {name for name, number in own if number != GEAR}
+            of_part = [constraint for link in links for constraint in of_link[link]]
+            meshed = {name: gears[name] for name, number in of_part if number == GEAR}
+            named = {name for name, number in of_part if number != GEAR}
             spoken = named.union(*(pair for pair, _ in meshed.values()))
             joints = {name: (kinds[name], mechanism.effective_joints[name].links) for name in kinds if name in spoken}
             matrix, owners = constraints(links, mechanism.fixed_link, joints, places, list(mechanism.drivers), meshed)
             rows = [k for k, name in enumerate(owners) if name in named or name in meshed]
             if rank(matrix[rows]) < 3 * len(links):
-                twice, loose = twice + own, loose.union(links)
+                twice, loose = twice + of_part, loose.union(links)
     if not twice:
         return None
     driven = mechanism.drivers

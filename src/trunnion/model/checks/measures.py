@@ -38,7 +38,7 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
     axis, along, of_angle = measure.axis is not None, measure.along is not None, key == "angle"
     figure, at, over = measure.statistic, measure.at is not None, measure.over is not None
     dwell, lasting = figure == "dwell", kind.in_time or name == "cycle" or key == "time_ratio"
-    placed, whole = key == "dead_centre" and figure in PLACES, measure.reduced
+    placed, reduced = key == "dead_centre" and figure in PLACES, measure.reduced
     yield from faults(
         where,
         (joint and kind.of == "joint" and (motion not in moves if key in ("rotation", "slide") else not moves), key,
@@ -61,9 +61,9 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
         ((at or over) and not mechanism.drivers, "at" if at else "over",
          "there is no driver whose coordinate it could be: the mechanism has one position"),
         (over and lasting, "over", f"the {key} is over all of it"),
-        (whole and (at or (figure is not None and not placed)), "at" if at else "as",
+        (reduced and (at or (figure is not None and not placed)), "at" if at else "as",
          f"the {key} is one number of a range already", f"remove it; of a dead_centre write {' or '.join(PLACES)}"),
-        (not whole and figure is not None and at != (figure == "value"), "as",
+        (not reduced and figure is not None and at != (figure == "value"), "as",
          f"the {figure} is {'of a range, not of' if at else 'that at'} a position", "state over: or at: …"),
     )  # fmt: skip
 

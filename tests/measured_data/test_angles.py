@@ -105,6 +105,17 @@ def test_resampling_of_a_known_sinus(clean: Columns, tmp_path: Path, harmonic: i
     assert error < bound + 1e-9
 
 
+def test_nothing_is_interpolated_across_a_jump(clean: Columns, tmp_path: Path) -> None:
+    """A torque of 4 N m that turns its sign twice a turn: a cubic through both sides would be off by up to 0.5 N m."""
+    jumps = np.where(np.sin(clean["angle"] + 0.3) > 0, 0.4, -0.4) + 0.01 * np.sin(clean["angle"])
+    changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0, "positions": 360}
+    (one,) = read({**clean, "T1": jumps}, tmp_path, changes).conditions
+    angle = 2 * np.pi * one.phase
+    beside = np.abs(np.sin(angle + 0.3)) > np.sin(2 * np.pi / 500)
+    true = np.where(np.sin(angle + 0.3) > 0, 4.0, -4.0) + 0.1 * np.sin(angle)
+    assert np.max(np.abs(one.courses["torque-in"].turns - true)[:, beside]) < 1e-3
+
+
 def test_averaging_lessens_noise(tmp_path: Path) -> None:
     """Of n samples a position and N turns the mean scatters by σ/√(n N), and the standard uncertainty says so."""
     columns = recorded(turns=60, noise=0.5, seed=3)

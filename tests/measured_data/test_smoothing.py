@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from trunnion.rig.reading.angle import coordinate, local_polynomials, seen_edges, smoothed, unresolved
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import Column, DataTable
-from trunnion.rig.reading.timebase import Timeline
+from trunnion.rig.reading.turns import Timeline
 
 Array = NDArray[np.float64]
 STEP = 1 / 5000

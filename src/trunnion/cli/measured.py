@@ -109,7 +109,7 @@ def compare(
     """
     from trunnion.rig.comparison import compare as run
     from trunnion.rig.reading.read import read_measured
-    from trunnion.rig.reading.timebase import gathered
+    from trunnion.rig.reading.turns import gathered
     from trunnion.views.compare import tables
 
     check_files(files, "comparison", kind)
@@ -145,7 +145,7 @@ def identify(
     """
     from trunnion.rig.identification.identify import identify as run
     from trunnion.rig.reading.read import read_measured
-    from trunnion.rig.reading.timebase import gathered
+    from trunnion.rig.reading.turns import gathered
     from trunnion.views.identify import tables
 
     check_files(files, "identification", kind)

@@ -137,13 +137,6 @@ def rate(measure: MotionRequest, walk: Forward) -> Number:
 # ---- other numbers of the motion ------------------------------------------------------------------------------
 
 
-def _attitude(measure: MotionRequest, walk: Forward) -> Number | tuple[Number, ...]:
-    """The angle of a link; in space the axes of its frame, nine numbers."""
-    if not isinstance(walk, SpatialWalk):
-        return value(measure, walk)
-    return tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
-
-
 def _turn_or_slide(measure: MotionRequest, walk: Forward, pair: tuple[Number, Number]) -> Number:
     """Of what a joint has of its rotation and of its slide the former, the latter if it does not turn."""
     return pair[0 if walk.system.turns(measure.subject) else 1]
@@ -291,7 +284,12 @@ CURVES: dict[str, Callable[[MotionRequest, Any], Number | tuple[Number, ...]]] =
     "point": value,
     "path_error": lambda measure, walk: tuple(_point(measure, walk).place),
     "straightness": lambda measure, walk: tuple(_point(measure, walk).place),
-    "angle": _attitude,
+    # in space the axes of the link's frame, nine numbers
+    "angle": lambda measure, walk: (
+        tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
+        if isinstance(walk, SpatialWalk)
+        else value(measure, walk)
+    ),
     "rotation": value,
     "slide": value,
     **dict.fromkeys(("transmission_error", "stroke", "dead_centre", "time_ratio"), _of_joint),

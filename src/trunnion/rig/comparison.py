@@ -43,7 +43,7 @@ from trunnion.rig.reading.measurement import (
     pairs_of,
     rms,
 )  # fmt: skip
-from trunnion.rig.reading.timebase import gathered
+from trunnion.rig.reading.turns import gathered
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
 

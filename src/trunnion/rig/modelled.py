@@ -17,7 +17,7 @@ from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.rig.reading.measurement import Condition, Signal
-from trunnion.rig.reading.timebase import gathered
+from trunnion.rig.reading.turns import gathered
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare

@@ -32,15 +32,6 @@ Has = Callable[[int, str, tuple[int, ...]], bool]  # whether a member has a vari
 MEMBERS = ("joint", "driver", "spring", "gear", "link", "point")  # in the order of the columns
 
 
-def _stems(dim: str, table: str) -> Stems:
-    """What stands behind the name of a member of a dimension in a table."""
-    return {
-        name: variable.column
-        for name, variable in VARIABLES.items()
-        if variable.dims[:1] == (dim,) and variable.column is not None and table in variable.tables
-    }
-
-
 def time_column(result: xr.Dataset) -> list[Column]:
     """The time of every position."""
     return [Column("time", "s", result["time"].values)]
@@ -129,7 +120,9 @@ def _members(result: xr.Dataset, table: str) -> Iterator[Column]:
         return _has(kinds[i], variable, spatial)
 
     for dim in MEMBERS:
-        stems = _stems(dim, table)
+        stems = {name: variable.column for name, variable in VARIABLES.items()
+                 if variable.dims[:1] == (dim,) and variable.column is not None
+                 and table in variable.tables}  # fmt: skip
         yield from of_members(result, dim, stems, moves) if dim == "joint" else of_members(result, dim, stems)
 
 

@@ -97,7 +97,13 @@ def quantile(freedom: Array | float, one_sided: bool = False) -> Array:
 def spread_of(fit: Fit, x: Array) -> Covariances:
     """Covariance of the estimates by source, with its degrees of freedom."""
     rows = fit.jacobian(x)
-    inverse, null = _inverse(rows.T @ rows)
+    information = rows.T @ rows
+    size = np.sqrt(np.diagonal(information))
+    size = np.where(size <= 1e-14 * np.max(size, initial=0.0), 1.0, size)
+    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    lost = values <= SINGULAR * max(float(values[-1]), 1.0)  # directions along which there is nothing to invert
+    inverse = (vectors[:, ~lost] / values[~lost]) @ vectors[:, ~lost].T / np.outer(size, size)
+    null = (vectors[:, lost] / size[:, None]).T
     # what a deviation at each position does to the estimates, (unknown and sensor, position), by block
     pulls = {k: inverse @ (np.nan_to_num(fit.reading(x, k)[1]) * fit.weight(k)) for k in fit.fitted}
     steps = {k: _steps(fit, x, k, pull) for k, pull in pulls.items()}
@@ -126,16 +132,6 @@ def spread_of(fit: Fit, x: Array) -> Covariances:
         below = sum(np.diagonal(part) ** 2 / free for part, free in random)
         freedom = np.where(below > 0, total**2 / below, np.inf)
     return Covariances(inverse, null, parts, freedom, test, follows, apart, excess)
-
-
-def _inverse(information: Array) -> tuple[Array, Array]:
-    """Inverse, and the directions, in units of the unknowns, along which there is nothing to invert."""
-    size = np.sqrt(np.diagonal(information))
-    size = np.where(size <= 1e-14 * np.max(size, initial=0.0), 1.0, size)
-    values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    lost = values <= SINGULAR * max(float(values[-1]), 1.0)
-    inverse = (vectors[:, ~lost] / values[~lost]) @ vectors[:, ~lost].T / np.outer(size, size)
-    return inverse, (vectors[:, lost] / size[:, None]).T
 
 
 def _steps(fit: Fit, x: Array, k: int, pull: Array) -> Array:

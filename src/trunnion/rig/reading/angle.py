@@ -18,8 +18,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.channels import missing
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import DataTable
-from trunnion.rig.reading.timebase import GAP, Say, Timeline, at_times, counted, unit_of, warning
-from trunnion.rig.reading.turns import TURN, joined
+from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, unit_of, warning
 
 __all__ = ["Coordinate", "Pulses", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 

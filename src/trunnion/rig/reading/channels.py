@@ -15,8 +15,7 @@ from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.measurement import Signal
 from trunnion.rig.reading.tables import Column
-from trunnion.rig.reading.timebase import Say, Timeline, counted, lost, note, runs, unit_of, warning
-from trunnion.rig.reading.turns import Turns, turn_means
+from trunnion.rig.reading.turns import Say, Timeline, Turns, counted, lost, note, runs, turn_means, unit_of, warning
 from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
 
 __all__ = [

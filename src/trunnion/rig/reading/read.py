@@ -19,8 +19,20 @@ from trunnion.rig.reading.angle import coordinate
 from trunnion.rig.reading.mapping import DataMapping, File, Mean, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.tables import DataTable, read_table
-from trunnion.rig.reading.timebase import counted, gathered, note, timeline, warning
-from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, left_in_turns, resampled, time_mean
+from trunnion.rig.reading.turns import (
+    DENSE,
+    Turns,
+    counted,
+    cut,
+    gathered,
+    joined,
+    left_in_turns,
+    note,
+    resampled,
+    time_mean,
+    timeline,
+    warning,
+)
 from trunnion.rig.reading.units import unit_name
 
 __all__ = ["read_measured"]

@@ -546,21 +546,17 @@ def eccentric_press() -> Mechanism:
     side force of the rod with (F − φ) tan β where the load moves the slider: there friction takes the load over from
     the side force, which it changes, to the couple, which it does not.
     """
-    guide = {"type": "prismatic", "links": ["frame", "slider"], "guide": {"length": 0.1}, "friction": 0.49}
-    pin = {"type": "revolute", "pin": {"radius": 0.005}}
     return Mechanism(
         links={
-            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+            "frame": {"points": {"O": [0, 0], "S": slide(0, 0)}},
             "crank": {"points": {"O": [0, 0], "P": [0.08, 0]}},
             "rod": {"points": {"P": [0, 0], "Q": [0.2, 0]}},
-            "slider": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "L": [0, 0.02]}},
+            "slider": {"points": {"Q": [0, 0], "S": slide(0, 0), "L": [0, 0.02]}},
         },
-        joints={
-            "O": pin | {"links": ["frame", "crank"]},
-            "P": pin | {"links": ["crank", "rod"]},
-            "Q": pin | {"links": ["rod", "slider"]},
-            "S": guide,
-        },
+        joints=joined(
+            "frame -O- crank -P- rod -Q- slider, frame =S= slider", S={"guide": {"length": 0.1}, "friction": 0.49}
+        ),
+        joint_defaults={"pin": {"radius": 0.005}},
         drivers={"O": {"speed": 1.0}},
         loads={"work": {"link": "slider", "at": "L", "force": [-100.0, 0.0]}},
         assembly={"Q": [0.28, 0.0]},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,23 @@ def body(points: Data, number: int = 1, size: float = 1.0) -> Data:
         "centre": [size * (0.2 + 0.07 * number), size * (0.1 - 0.05 * number)],
         "inertia": size**2 * (0.05 + 0.02 * number),
     }
+
+
+def bare(data: Data) -> Data:
+    """The same with massless links and without loads."""
+    data = copy.deepcopy(data)
+    for link in data["links"].values():
+        for key in ("mass", "inertia", "centre", "inertia_about"):
+            link.pop(key, None)
+    return {**data, "loads": {}}
+
+
+def corner(b: Any, d: Any, bc: Any, cd: Any, side: float) -> Any:
+    """Where circles about two points x + i y meet, to the left of the way from b to d for side 1; NaN if nowhere."""
+    far = np.abs(d - b)
+    with np.errstate(invalid="ignore"):
+        share = (bc**2 - cd**2 + far**2) / (2 * far)
+        return b + (d - b) / far * (share + 1j * side * np.sqrt(bc**2 - share**2))
 
 
 def plunger(r: float, rod: float, pins: Data) -> Data:

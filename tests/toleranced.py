@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanisms_parts import Data, joined, revolute, slide
+from mechanisms_parts import Data, corner, joined, revolute, slide
 from trunnion import Mechanism
 from trunnion.studies.tolerance.inputs import inputs_of
 from trunnion.studies.tolerance.linear import ToleranceStudy, study
@@ -84,13 +84,7 @@ def fourbar(tolerance: str = "±0.05 mm", loaded: bool = False, speed: float = 4
 
 def fourbar_angle(l1: Any, l2: Any, l3: Any, l4: Any, crank: Any = np.pi / 3) -> Any:
     """Angle of the rocker, rad, by two circles: NaN where they do not meet."""
-    b = l2 * np.exp(1j * np.asarray(crank))
-    away = l1 - b
-    far = np.abs(away)
-    with np.errstate(invalid="ignore"):
-        turn = np.arccos((l3**2 + far**2 - l4**2) / (2 * l3 * far))
-    c = b + l3 * away / far * np.exp(1j * turn)
-    return np.angle(c - l1)
+    return np.angle(corner(l2 * np.exp(1j * np.asarray(crank)), l1, l3, l4, 1) - l1)
 
 
 # ---- slider-crank ---------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import pytest
 import trunnion
 from brief import brief
 from mechanisms import Array, Data, findings, four_bar, prismatic, slide, slider_crank
+from mechanisms_parts import bare
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.spline import look_up
@@ -19,14 +20,6 @@ from trunnion.solve.run import prepare
 STEPS = 48
 TURN = 2 * np.pi
 FULL_TURN = np.arange(STEPS) * (TURN / STEPS)
-
-
-def bare(data: Data) -> Data:
-    """Massless links, no loads."""
-    data = copy.deepcopy(data)
-    for link in data["links"].values():
-        link.pop("mass", None), link.pop("inertia", None), link.pop("centre", None)
-    return {**data, "loads": {}}
 
 
 def run(data: Data, steps: int = STEPS) -> Any:

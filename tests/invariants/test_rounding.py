@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import trunnion
 from brief import brief
 from mechanisms import DURANGO, in_units, model, slider_crank, transformed
-from mechanisms_parts import joined
+from mechanisms_parts import bare, joined
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.results.scales import Scales, without_noise
@@ -37,10 +37,7 @@ def balanced(space: str = "planar") -> Data:
         data, link = transformed(model(slider_crank(offset=0.0), friction=0.1), 0.3), "rod"
     loads = {name: {"link": link, "moment": moment} for name, moment in moments.items()}
     data["drivers"] = {"A": {"law": "harmonic", "mean": 1.0, "amplitude": 0.4, "period": 1.0}}
-    for link in data["links"].values():
-        for key in ("mass", "centre", "inertia"):
-            link.pop(key, None)
-    return {**data, "gravity": [0.0] * len(data["gravity"]), "loads": loads}
+    return {**bare(data), "gravity": [0.0] * len(data["gravity"]), "loads": loads}
 
 
 def parallel() -> Data:

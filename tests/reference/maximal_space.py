@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]
@@ -19,8 +20,8 @@ TURN = 2 * np.pi
 Row = tuple[Any, Any, Any]  # numbers, or one for each of several motions
 
 __all__ = [
-    "Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "in_planes", "point", "pose_of", "raised",
-    "rotation", "turned", "unrolled",
+    "Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "in_planes", "point", "pose_of", "published",
+    "raised", "rotation", "turned", "unrolled",
 ]  # fmt: skip
 
 
@@ -114,6 +115,12 @@ def pose_of(frame: Any, i: int = 0) -> Frame:
         x, y, c, s = (here(n) for n in frame)
         return Frame(np.array([x, y, 0.0]), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
     return Frame(np.array([here(n) for n in frame.place]), np.array([[here(n) for n in axis] for axis in frame[:3]]).T)
+
+
+def published(result: Any, link: str, i: int) -> Frame:
+    """The pose of a link at one position of a result in space."""
+    place, turn = (result[f"link_{what}"].sel(link=link).values[:, i] for what in ("position", "rotation"))
+    return Frame(place, Rotation.from_quat(np.roll(turn, -1)).as_matrix())
 
 
 def raised(data: Data) -> Data:

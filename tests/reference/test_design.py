@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from itertools import combinations
 from typing import Any
 
@@ -11,6 +10,7 @@ import pytest
 
 import trunnion
 from mechanisms import MODELS, Array, Data, build, four_bar, model, slider_crank
+from mechanisms_parts import bare
 from trunnion import Mechanism
 from trunnion.solve.forward import forward
 from trunnion.solve.run import prepare
@@ -168,11 +168,7 @@ def test_slider_crank(offset: float) -> None:
 @pytest.mark.parametrize("loaded", [1, 0])
 def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name: str, loaded: int) -> None:
     """Massless, no friction, loads on one link of the dyad alone: the other is a two-force link."""
-    data: Data = copy.deepcopy(MODELS[name]())
-    for link in data["links"].values():
-        for key in ("mass", "inertia", "centre", "inertia_about"):
-            link.pop(key, None)
-    mechanism = build({**data, "loads": {}, "gravity": [0, 0]}).with_friction("off")
+    mechanism = build({**bare(MODELS[name]()), "gravity": [0, 0]}).with_friction("off")
     module = next(one for one in prepare(mechanism).system.plan.modules if len(one.links) == 2)
     if module.kind == "RPP" and loaded == 0:
         return  # the second link passes a couple and no force

@@ -20,7 +20,7 @@ from mechanisms import (
     rocker_train,
     screwed_strut,
 )
-from mechanisms_parts import joined, slide
+from mechanisms_parts import corner, joined, slide
 from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare
 
@@ -130,13 +130,8 @@ def at(result: Any, variable: str, axis: str | None = None, **where: str) -> Any
 
 def knuckle_by_hand(rack: Any) -> Any:
     """Angle of the knuckle for a place of the rack: circles about T and K meet in A, on the lower side."""
-    tx, ty, kx, ky = 0.3 + rack, 0.0, 0.6, 0.15
-    arm, rod, apart = np.hypot(0.02, 0.14), 0.285, np.hypot(kx - tx, ky - ty)
-    along = (rod**2 - arm**2 + apart**2) / (2 * apart)
-    across = np.sqrt(rod**2 - along**2)
-    ux, uy = (kx - tx) / apart, (ky - ty) / apart
-    ax, ay = tx + along * ux + across * uy, ty + along * uy - across * ux
-    return np.arctan2(ay - ky, ax - kx) - np.arctan2(-0.14, -0.02)
+    a = corner(0.3 + np.asarray(rack), 0.6 + 0.15j, 0.285, np.hypot(0.02, 0.14), -1)
+    return np.angle((a - (0.6 + 0.15j)) / (-0.02 - 0.14j))
 
 
 @pytest.mark.parametrize(("order", "angle"), [(("P", "S"), 20.0), (("S", "P"), 14.5)])

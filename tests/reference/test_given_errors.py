@@ -13,7 +13,19 @@ import trunnion
 from mechanisms import MODELS, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
 from mechanisms_space import Drawn, rssr
-from reference.maximal_space import Array, Data, Drive, Frame, Linkage, Motion, element, point, pose_of, rotation
+from reference.maximal_space import (
+    Array,
+    Data,
+    Drive,
+    Frame,
+    Linkage,
+    Motion,
+    element,
+    point,
+    pose_of,
+    published,
+    rotation,
+)
 from reference.seat_oracle import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.solve.run import prepare
@@ -47,12 +59,7 @@ def by_hand(data: Data, shift: Frame) -> Data:
 
 def motions(data: Data, result: xr.Dataset, i: int) -> dict[str, Motion]:
     """Motion at one position by another program, from near where Trunnion has it."""
-    home = {}
-    for link in ("crank", "rod", "rocker"):
-        w, x, y, z = result.link_rotation.sel(link=link).values[:, i]
-        angle = 2 * np.arctan2(np.linalg.norm([x, y, z]), w)
-        axes = rotation([x, y, z], float(angle)) if angle else np.eye(3)
-        home[link] = Frame(result.link_position.sel(link=link).values[:, i], axes)
+    home = {link: published(result, link, i) for link in ("crank", "rod", "rocker")}
     turned = float(result.joint_rotation.sel(joint="A").values[i])
     return Linkage(data).move(home, {"A": Drive(turned, 30.0)})
 
@@ -63,12 +70,9 @@ def agrees(result: xr.Dataset, data: Data) -> dict[str, Motion]:
     for i in (0, 7, 15, 23):
         found = motions(data, result, i)
         for link in ("crank", "rocker"):
-            place = result.link_position.sel(link=link).values[:, i]
-            np.testing.assert_allclose(place, found[link].frame.place, rtol=0, atol=1e-13)
-            w, *v = result.link_rotation.sel(link=link).values[:, i]
-            x = found[link].frame.axes[:, 0]
-            turned = np.array([1.0, 0, 0]) + 2 * np.cross(v, np.cross(v, [1.0, 0, 0]) + w * np.array([1.0, 0, 0]))
-            np.testing.assert_allclose(turned, x, rtol=0, atol=1e-12)
+            at = published(result, link, i)
+            np.testing.assert_allclose(at.place, found[link].frame.place, rtol=0, atol=1e-13)
+            np.testing.assert_allclose(at.axes, found[link].frame.axes, rtol=0, atol=1e-12)
     return found
 
 

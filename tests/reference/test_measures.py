@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import trunnion
 from measured import figures
 from mechanisms import DURANGO, build, four_bar, slider_crank
+from mechanisms_parts import corner
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -203,14 +204,6 @@ def width(x: Any, y: Any) -> float:
 
     best = optimize.minimize_scalar(squares, bracket=(-0.1, 0.1), options={"xtol": 1e-12}).x
     return float(np.ptp((y - np.mean(y)) * np.cos(best) - (x - np.mean(x)) * np.sin(best)))
-
-
-def corner(b: Any, d: Any, bc: Any, cd: Any, side: float) -> Any:
-    """Where circles about two points of the complex plane meet."""
-    along = d - b
-    far = np.abs(along)
-    share = (bc**2 - cd**2 + far**2) / (2 * far)
-    return b + along / far * (share + 1j * side * np.sqrt(bc**2 - share**2))
 
 
 def test_straightness_of_hoeckens_line() -> None:

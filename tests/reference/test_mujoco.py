@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import mechanisms_space
 from brief import brief
 from mechanisms import MODELS, Array, build, model
-from reference.maximal_space import Drive, Frame, unrolled
+from reference.maximal_space import Drive, published, unrolled
 from reference.mujoco_engine import Engine as PlanarEngine
 from reference.mujoco_space import Engine, quaternion
 from trunnion import Mechanism
@@ -95,10 +94,7 @@ def test_in_space(name: str) -> None:
         def given(variable: str, i: int = i, **where: str) -> Array:
             return np.asarray(result[variable].sel(**where).values[..., i], float)
 
-        frames = {}
-        for link in engine.oracle.moving:
-            turn = Rotation.from_quat(np.roll(given("link_rotation", link=link), -1))
-            frames[link] = Frame(given("link_position", link=link), turn.as_matrix())
+        frames = {link: published(result, link, i) for link in engine.oracle.moving}
         rates = ("", "_velocity", "_acceleration")
         drive = {name: Drive(*(float(given(f"joint_{ways[name]}{rate}", joint=name)) for rate in rates))
                  for name in data["drivers"]}  # fmt: skip

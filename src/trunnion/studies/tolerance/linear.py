@@ -53,7 +53,7 @@ __all__ = [
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
 MOST_PAIRS = 720  # places between which a peak-to-peak deviation is looked for
-ROUNDS, AROUND = 7, 17  # in which the worst place is looked for, and places about it in each
+ROUNDS, AROUND = 7, 17  # in which the worst place of a course is looked for, and places about it in each
 TURNS = 8  # in which the direction of a worst case settles
 
 
@@ -456,7 +456,6 @@ def _widest(course: FirstOrder) -> Array:
 # ---- the worst corner of one measure -------------------------------------------------------------------------------
 
 SIDES = ("least", "largest")
-ROUNDS, AROUND = 4, 17  # in which the place is looked for, and places about it in each
 
 
 @dataclass(frozen=True)

@@ -291,8 +291,8 @@ class ToleranceStudy:
             place = float(time[top])
             if len(time) == 1:
                 break
-            sides = time[max(top - 1, 0)], time[min(top + 1, len(time) - 1)]
-            time = np.unique([np.linspace(place, side, AROUND // 2 + 1) for side in sides])
+            time = np.linspace(time[max(top - 1, 0)], time[min(top + 1, len(time) - 1)], AROUND)
+            time = np.sort(np.append(time, place))
         parts = [Dual(part.real[:, [top]], part.dual[:, [top]]) for part in walked.parts]
         worst, scatter = (
             FirstOrder(self.effects, self._course(measure, parts, each).slope[:, 0]) for each in (True, False)

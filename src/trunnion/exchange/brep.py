@@ -21,7 +21,7 @@ from scipy.optimize import minimize_scalar
 from trunnion.exchange.draft import Array, Place, perpendicular, refused, steiner
 from trunnion.exchange.part21 import Part21
 
-__all__ = ["Face", "Geometry", "Moments", "Solid"]
+__all__ = ["Face", "Geometry", "Solid", "mass_of", "moments_of", "moved"]
 
 GAUSS = np.polynomial.legendre.leggauss(12)  # along an edge, a piece of at most 45°
 INNER = np.polynomial.legendre.leggauss(24)  # across a face: exact for powers, 1e-14 for a full turn of a torus
@@ -40,39 +40,25 @@ class UnreadError(Exception):
     """A curve that is not integrated along."""
 
 
-@dataclass
-class Moments:
-    """Volume, m³, its first moment, m⁴ (3,), and second moment ∫ q qᵀ dV, m⁵ (3, 3), about the origin."""
+def moments_of(volume: float, first: Array, second: Array) -> Array:
+    """∫ h hᵀ dV with h = (1, q), (4, 4): volume, m³, first moment, m⁴, and second moment, m⁵, about the origin.
 
-    volume: float = 0.0
-    first: Array = field(default_factory=lambda: np.zeros(3))
-    second: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    Those of several bodies add up; times a density they are those of the mass.
+    """
+    return np.block([[np.array([[volume]]), first[None]], [first[:, None], second]])
 
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(self.volume + other.volume, self.first + other.first, self.second + other.second)
 
-    def __mul__(self, factor: float) -> Moments:
-        return Moments(factor * self.volume, factor * self.first, factor * self.second)
+def moved(moments: Array, place: Place) -> Array:
+    """The moments of the same body at another place."""
+    frame = np.block([[np.ones((1, 1)), np.zeros((1, 3))], [place.shift[:, None], place.matrix]])
+    return np.asarray(abs(np.linalg.det(place.matrix)) * frame @ moments @ frame.T)
 
-    def at(self, place: Place) -> Moments:
-        """Of the same body at another place."""
-        matrix, shift = place.matrix, place.shift
-        grown = abs(float(np.linalg.det(matrix)))
-        first, second = matrix @ self.first, matrix @ self.second @ matrix.T
-        cross = np.outer(first, shift)
-        second = second + cross + cross.T + self.volume * np.outer(shift, shift)
-        return Moments(self.volume, first + self.volume * shift, second) * grown
 
-    @property
-    def centre(self) -> Array:
-        """Centre of the volume, m."""
-        return np.asarray(self.first / self.volume)
-
-    @property
-    def inertia(self) -> Array:
-        """Inertia tensor about the centre for a density of 1, m⁵."""
-        about = np.trace(self.second) * np.eye(3) - self.second
-        return np.asarray(about - self.volume * steiner(self.centre))
+def mass_of(moments: Array) -> tuple[float, Array, Array]:
+    """Volume or mass, its centre and the inertia tensor about that."""
+    volume, first, second = moments[0, 0], moments[0, 1:], moments[1:, 1:]
+    centre = first / volume
+    return float(volume), centre, np.trace(second) * np.eye(3) - second - volume * steiner(centre)
 
 
 @dataclass
@@ -109,11 +95,11 @@ class Face:
 
 @dataclass
 class Solid:
-    """A body of a file: its faces and moments; doubts: why the moments are not exact."""
+    """A body of a file: its faces, its moments by `moments_of`; doubts: why these are not exact."""
 
     number: int
     faces: list[Face]
-    moments: Moments
+    moments: Array
     doubts: list[str]
 
 
@@ -283,15 +269,15 @@ class Geometry:
         for void in args[2] if kind == "BREP_WITH_VOIDS" else []:
             *_, shell, along = self.file.args(void, "ORIENTED_CLOSED_SHELL")
             shells.append((shell, bool(along)))
-        solid = Solid(number, [], Moments(), [])
+        solid = Solid(number, [], np.zeros((4, 4)), [])
         used: Counter[tuple[int, bool]] = Counter()
         for shell, along in shells:
             for face in self.file[shell][self.file.kind(shell)][1]:
                 self._face(face, along, solid, used)
         if any(used[edge, True] != used[edge, False] for edge, _ in used if edge >= 0):
             solid.doubts.append("its surface is not closed")
-        if not solid.doubts and solid.moments.volume < 0:  # inside out
-            solid.moments = solid.moments * -1.0
+        if not solid.doubts and solid.moments[0, 0] < 0:  # inside out
+            solid.moments = -solid.moments
             for piece in solid.faces:
                 piece.outward = not piece.outward
         return solid
@@ -358,14 +344,14 @@ def _profile(face: Face, v: Array) -> tuple[Array, Array, Array, Array]:
     return ring + tube * np.cos(v), tube * np.sin(v), -tube * np.sin(v), tube * np.cos(v)
 
 
-def _integrals(face: Face, loops: list[tuple[Array, Array]]) -> tuple[float, Moments]:
+def _integrals(face: Face, loops: list[tuple[Array, Array]]) -> tuple[float, Array]:
     """∬ |n| and the moments by the divergence theorem over the part of a surface that loops bound.
 
     Both have the sign of the loops: positive if they run counter-clockwise as the surface's own normal sees them. Of a
     sphere or torus they are determined but for a multiple of the closed surface.
     """
     if not loops:
-        return 0.0, Moments()
+        return 0.0, np.zeros((4, 4))
     frame = _pole_free(face, loops) if face.kind == "sphere" else face.frame
     places = (np.vstack([nodes for nodes, _ in loops]) - face.origin) @ frame.T
     rates = np.vstack([tangents for _, tangents in loops]) @ frame.T
@@ -400,20 +386,20 @@ def _integrals(face: Face, loops: list[tuple[Array, Array]]) -> tuple[float, Mom
     return _revolved(face, frame, across, radial[:, None, :], -du * (v - start) / 2)
 
 
-def _revolved(face: Face, frame: Array, v: Array, radial: Array, weights: Array) -> tuple[float, Moments]:
+def _revolved(face: Face, frame: Array, v: Array, radial: Array, weights: Array) -> tuple[float, Array]:
     """The sums over nodes on a surface of revolution; its normal times the area element is r (z′ e_r − r′ e_z)."""
     r, z, dr, dz = (part[..., None] for part in _profile(face, v))
     q = face.origin + r * radial + z * frame[2]
     return _summed(q, np.broadcast_to(r * (dz * radial - dr * frame[2]), q.shape), weights)
 
 
-def _summed(q: Array, normal: Array, weights: Array) -> tuple[float, Moments]:
+def _summed(q: Array, normal: Array, weights: Array) -> tuple[float, Array]:
     """Σ over nodes (n, 24): areas and moments; ∫ q…q dV = ∬ q…q (q·n) dA / (3 + number of q)."""
     total = weights[:, None] * INNER[1]
     area = float((total * np.linalg.norm(normal, axis=-1)).sum())
     flux = total * (q * normal).sum(axis=-1)
-    first = np.einsum("ij,ijk->k", flux, q) / 4
-    return area, Moments(float(flux.sum()) / 3, first, np.einsum("ij,ijk,ijl->kl", flux, q, q) / 5)
+    h, count = np.concatenate([np.ones_like(q[..., :1]), q], axis=-1), np.array([0, 1, 1, 1])
+    return area, np.einsum("ij,ijk,ijl->kl", flux, h, h) / (3 + count + count[:, None])
 
 
 def _pole_free(face: Face, loops: list[tuple[Array, Array]]) -> Array:
@@ -426,7 +412,7 @@ def _pole_free(face: Face, loops: list[tuple[Array, Array]]) -> Array:
     return np.array([x, np.cross(axis, x), axis])
 
 
-def _closed_surface(face: Face) -> tuple[float, Moments]:
+def _closed_surface(face: Face) -> tuple[float, Array]:
     """Area and moments of a full sphere or torus."""
     if face.kind == "sphere":
         area, volume = 4 * math.pi * face.radius**2, 4 / 3 * math.pi * face.radius**3
@@ -435,4 +421,4 @@ def _closed_surface(face: Face) -> tuple[float, Moments]:
         area, volume = 4 * math.pi**2 * face.radius * face.minor, 2 * math.pi**2 * face.radius * face.minor**2
         across = volume * (face.radius**2 + 0.75 * face.minor**2) / 2
         central = face.frame.T @ np.diag([across, across, volume * face.minor**2 / 4]) @ face.frame
-    return area, Moments(volume, volume * face.origin, volume * np.outer(face.origin, face.origin) + central)
+    return area, moments_of(volume, volume * face.origin, volume * np.outer(face.origin, face.origin) + central)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.brep import Face, Moments, Solid
+from trunnion.exchange.brep import Face, Solid, mass_of, moments_of, moved
 from trunnion.exchange.draft import MATERIALS, Array, Body, Draft, ImportOptions, Place, free_name, refused
 from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
@@ -128,8 +128,7 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
 
 def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: ImportOptions, draft: Draft) -> Body:
     """A link of solids: mass, centre and inertia in the global frame."""
-    total = Moments()
-    body = Body(name)
+    body, total = Body(name), np.zeros((4, 4))
     for leaf, solid, place in entries:
         density, material = assembly.density(leaf.definition)
         origin = "of the file"
@@ -146,10 +145,10 @@ def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: Impo
             doubts = "; ".join(dict.fromkeys(solid.doubts))
             what = f"has a solid (#{solid.number}) that is not integrated by its faces: {doubts}; its mass is {how}"
             draft.warn("exchange.mesh", f"links.{name}", what, "compare it with that of the CAD program")
-        total = total + moments.at(place) * density
+        total = total + density * moved(moments, place)
         body.comments.append(f"{leaf.name or name}, solid #{solid.number}: {density:g} kg/m³ {origin}, {how}")
-    if total.volume > 0:
-        body.mass, body.centre, body.inertia = total.volume, total.centre, total.inertia
+    if total[0, 0] > 0:
+        body.mass, body.centre, body.inertia = mass_of(total)
     return body
 
 
@@ -186,7 +185,7 @@ for part in (1.0, 0.25):
 """
 
 
-def _meshed(file: Part21, solid: Solid) -> tuple[Moments, str]:
+def _meshed(file: Part21, solid: Solid) -> tuple[Array, str]:
     """The moments of a solid by two meshes of OpenCASCADE, and how far they agree.
 
     In a process of its own, for a foreign library that reads foreign files may hang or crash.
@@ -198,16 +197,16 @@ def _meshed(file: Part21, solid: Solid) -> tuple[Moments, str]:
         try:
             done = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
             coarse, fine = (
-                Moments(volume, np.array(first), np.array(second))
+                moments_of(volume, np.array(first), np.array(second))
                 for volume, first, second in map(json.loads, done.stdout.splitlines()[-2:])
             )
         except subprocess.TimeoutExpired:
-            return Moments(), "not found: its mesh takes too long"
+            return np.zeros((4, 4)), "not found: its mesh takes too long"
         except (subprocess.CalledProcessError, ValueError):
-            return Moments(), "not found: it needs the extra 'cad', or cannot be meshed"
-    if not fine.volume > 0:
-        return Moments(), "not found: its mesh encloses no volume"
-    return fine, f"by a mesh, to about {abs(coarse.volume / fine.volume - 1) / 3:.1g}"
+            return np.zeros((4, 4)), "not found: it needs the extra 'cad', or cannot be meshed"
+    if not fine[0, 0] > 0:
+        return np.zeros((4, 4)), "not found: its mesh encloses no volume"
+    return fine, f"by a mesh, to about {abs(coarse[0, 0] / fine[0, 0] - 1) / 3:.1g}"
 
 
 def _alone(file: Part21, number: int) -> str:
@@ -314,8 +313,8 @@ def write(positions: Positions, path: Path) -> list[Finding]:
     for name, definition, representation, origin, drawn in parts:
         use = text(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE({quoted(name)},{quoted(name)},'',#{root[0]},#{definition},$)")
         shape = text(f"PRODUCT_DEFINITION_SHAPE('','',#{use})")
-        moved = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{origin},#{drawn})")
-        relation = text(_relation(representation, root[1], moved))
+        shifted = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{origin},#{drawn})")
+        relation = text(_relation(representation, root[1], shifted))
         text(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
     path.write_text(text.text(), encoding="ascii")
     draft.note("exchange.skeleton", "", "points, axes and lines are written, without masses, joints and friction")

@@ -118,6 +118,22 @@ def test_other_values_in_xml_are_no_traceback(seed: int, suffix: str, tmp_path_f
         model_text(import_file(path))
 
 
+@pytest.mark.parametrize("key", ["joints", "links"])
+@pytest.mark.parametrize("value", [None, "?", {}, float("nan"), ...])
+def test_other_values_in_json_are_no_traceback(key: str, value: object, tmp_path: Path) -> None:
+    """Everywhere in turn; ... takes the entry out."""
+    path = tmp_path / "linkage.json"
+    for k, part in ((k, part) for k, item in enumerate(FOUR_BAR[key]) for part in item):
+        changed = json.loads(json.dumps(FOUR_BAR))
+        if value is ...:
+            del changed[key][k][part]
+        else:
+            changed[key][k][part] = value
+        path.write_text(json.dumps(changed))
+        with suppress(MechanismError):
+            model_text(import_file(path))
+
+
 def points(count: int, x: bytes = b"1.0") -> bytes:
     marks = b"  0\nPOINT\n  8\na\n 10\n" + x + b"\n 20\n2.0\n"
     return b"  0\nSECTION\n  2\nENTITIES\n" + marks * count + b"  0\nENDSEC\n  0\nEOF\n"

@@ -202,32 +202,9 @@ def test_a_slider_of_pylinkage_is_a_pin_on_a_line(tmp_path: Path) -> None:
     np.testing.assert_allclose(place[:, 0], [-60, -math.sqrt(7200), -120, -math.sqrt(7200)], atol=1e-9)
 
 
-def damaged() -> list[Any]:
-    """Files with something taken out or replaced, everywhere."""
-    found: list[Any] = []
-    for base, key in ((FOUR_BAR, key) for key in ("joints", "links")):
-        for k, part in ((k, part) for k, item in enumerate(base[key]) for part in item):
-            for value in (None, "?", {}, float("nan")):
-                changed = json.loads(json.dumps(base))
-                changed[key][k][part] = value
-                found.append(changed)
-            changed = json.loads(json.dumps(base))
-            del changed[key][k][part]
-            found.append(changed)
-    return found
-
-
-def test_damaged_files_are_refused_or_read_but_never_end_in_a_traceback(tmp_path: Path) -> None:
-    refused = 0
-    for data in damaged():
-        try:
-            model_text(import_file(written(data, tmp_path)))
-        except MechanismError:
-            refused += 1
-    assert refused > 70
+def test_joints_without_a_place_of_their_own_or_too_many_are_refused(tmp_path: Path) -> None:
     twice = {**FOUR_BAR, "joints": [*FOUR_BAR["joints"], FOUR_BAR["joints"][1]]}
-    with pytest.raises(MechanismError, match="two joints of the same name"):
-        import_file(written(twice, tmp_path))
     many = {"joints": [{"id": str(k), "type": "revolute", "position": [k, 0]} for k in range(100_000)], "links": []}
-    with pytest.raises(MechanismError, match="at most 2,000"):
-        import_file(written(many, tmp_path))
+    for data, says in ((twice, "two joints of the same name"), (many, "at most 2,000")):
+        with pytest.raises(MechanismError, match=says):
+            import_file(written(data, tmp_path))

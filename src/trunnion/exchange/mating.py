@@ -268,9 +268,7 @@ class _Contacts:
         axes, slack = [contact.hole.axis for contact in self.contacts], [abs(contact.play) for contact in self.contacts]
         numbers = _line_numbers([contact.middle for contact in self.contacts], axes, slack)
         self.line = dict(zip(self.contacts, numbers, strict=True))  # number of the axis of each contact
-        self.plane: Array | None = (
-            None  # normal of the plane that it may move in: two pins along it, others slide in it
-        )
+        self.plane: Array | None = None  # its normal where it may move in one: two pins along it, others slide in it
         for normal in [] if self.balls else axes:
             along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
             across = [
@@ -291,9 +289,7 @@ class _Contacts:
             if hole.covered < COVERED[0]:
                 if 0 <= play <= gap:
                     what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
-                    draft.warn(
-                        "exchange.half", f"links.{hole.body}", what, "add the joint to the model file if it is one"
-                    )
+                    draft.warn("exchange.half", f"links.{hole.body}", what, "add the joint to the model if it is one")
             elif 0 <= play <= gap:
                 contacts.append(contact)
             elif play < 0 and -play <= max(gap, THREAD * pin.radius):
@@ -302,10 +298,10 @@ class _Contacts:
             else:
                 doubts.append(contact)
         met = {frozenset((contact.pin.body, contact.hole.body)) for contact in contacts}
-        for pin, hole, gap in ((contact.pin, contact.hole, contact.play) for contact in doubts):
+        for pin, hole, play in ((contact.pin, contact.hole, contact.play) for contact in doubts):
             if frozenset((pin.body, hole.body)) not in met and self.leader[pin.body] != self.leader[hole.body]:
-                what = f"{pin.label} and {hole.label} differ by {1e3 * gap:.6g} mm in radius: no joint is made of them"
-                draft.warn("exchange.gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=gap)
+                what = f"{pin.label} and {hole.label} differ by {1e3 * play:.6g} mm in radius: no joint is made of them"
+                draft.warn("exchange.gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=play)
         return contacts
 
     def lines(self, contacts: Sequence[Contact]) -> set[int]:

@@ -150,7 +150,7 @@ def test_the_compiled_engine_has_them() -> None:
 @pytest.mark.parametrize(
     ("joint", "losses", "where"),
     [
-        ("O", {}, "joints.O"),
+        ("O", {}, "joints.O.losses"),
         ("O", {"constant": "2 N"}, "joints.O.losses.constant"),
         ("S", {"viscous": "0.1 N m s/rad"}, "joints.S.losses.viscous"),
         ("O", {"constant": -1}, "joints.O.losses.constant"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
@@ -25,23 +25,6 @@ JUMP = 60.0  # °: a seat that turns by more from one position to the next is ta
 LEAST = 0.1  # of the largest error of place: points below it are not among the worst
 ALIKE = 1e-3  # of the largest: two curves nearer than this are one
 MOST_WORST, MOST_PLACES = 4, 12
-# what a result may lack, and what to do
-LACKS = {
-    "errors": ("the mechanism has no errors",
-               "state errors, a misalignment, or a seat: loaded (--set joint_defaults.seat=loaded)"),
-    "seats": ("no joint of the mechanism has a pin with a seat",
-              "state a clearance and seat: loaded of a joint (--set joint_defaults.seat=loaded)"),
-}  # fmt: skip
-
-
-def need(result: xr.Dataset, part: str, figure: str) -> None:
-    """MechanismError with the reason if a result lacks "errors", or "seats" that are known anywhere, of a figure."""
-    if "point_error" in result if part == "errors" else seated(result):
-        return
-    what, remedy = LACKS[part]
-    if part == "seats" and "seat_offset" in result:
-        what, remedy = "no position is solved", "run `trunnion check` to see why"
-    raise MechanismError(Finding(f"{what}, and there is no figure '{figure}'", "--kind", remedy))
 
 
 # ---- errors and seats -----------------------------------------------------------------------------------------------

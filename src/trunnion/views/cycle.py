@@ -22,7 +22,7 @@ from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, prefixed, quantity, scaled
 from trunnion.results.scales import without_noise
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.as_built import Seats, losses, need, outputs, point_errors, seat_angles, seated, worst_points
+from trunnion.views.as_built import Seats, losses, outputs, point_errors, seat_angles, seated, worst_points
 from trunnion.views.axis import Array, abscissa, column, is_spatial, larger_end, layout, members, names
 from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, Rule, Stripe
 from trunnion.views.curves import FREE, check_kind, ease, nth, outside, over_drive, peak, silent, usual_peak
@@ -91,12 +91,8 @@ def varying(result: xr.Dataset) -> dict[str, tuple[Array, str]]:
 
 def speed(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Speed of the drivers over the cycle, where it varies: of a stated motion law, or of a steady cycle."""
-    speeds = varying(result)
-    if not speeds:
-        what, remedy = "the speed of no driver varies", "use `trunnion simulate --steady`, or a motion law"
-        raise MechanismError(Finding(what, "speed", remedy))
     return _stack("Speed", [over_drive(result, f"speed {name}", unit, {name: values})
-                            for name, (values, unit) in speeds.items()])  # fmt: skip
+                            for name, (values, unit) in varying(result).items()])  # fmt: skip
 
 
 def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
@@ -240,9 +236,6 @@ def drawn_measures(result: xr.Dataset) -> list[int]:
 def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """The model's measures over the drive: a panel for each course, with the figures of all measures of it."""
     rows, charts = drawn_measures(result), list[Chart]()
-    if not rows:
-        what = "there is no measure with one number at every position"
-        raise MechanismError(Finding(what, "measures", "state measures: in the model"))
     units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
     texts, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
     labels, values, figures = names(result, "measure"), result["measure_value"].values, result["measure_figure"].values
@@ -274,7 +267,6 @@ WEAK = 0.02  # of the largest load: a smaller one has no arrow
 
 def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Errors against the mechanism without any: of the worst points and of the joints of the ground, over the drive."""
-    need(result, "errors", "error")
     lost_at = losses(result)
     places = np.unique(np.concatenate(list(lost_at.values()))) if lost_at else np.empty(0, int)
     lost = [Rule(float(abscissa(result).values[place]), None if k else f"contact lost: {', '.join(lost_at)}",
@@ -293,7 +285,6 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
 def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Pin in hole for every joint and end: locus of the pin's centre over the drive, marked positions, their loads."""
-    need(result, "seats", "seat")
     charts, paired = list[Chart](), False
     for seats in seated(result):
         if seats.planar_guide:  # see `beta`
@@ -301,9 +292,6 @@ def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         both = [(0, (0, 1)), (0, (0, 2))] if seats.kind == "ball" else [(k, (0, 1)) for k in range(len(seats.offsets))]
         paired |= len(both) == 2  # both ends of a joint stay side by side
         charts += [_hole(seats, end, plane, result) for end, plane in both]
-    if not charts:
-        what = "the seats are those of guides in the plane"
-        raise MechanismError(Finding(what, "--kind seat", "see the figure 'beta'"))
     columns = 4 if paired and len(charts) > 2 else len(charts) if len(charts) <= 2 else 2 if len(charts) == 4 else 3
     width = {1: 4.6, 4: 10.4}.get(columns, 7.4)
     panels = [Panel("", [chart], width / columns + 0.55) for chart in charts]
@@ -360,11 +348,7 @@ def beta(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
     A dot for every position, as seats jump; crosses mark the positions without contact.
     """
-    need(result, "seats", "beta")
     charts = _seat_courses(result)
-    if not charts:
-        what = "the seats of balls are directions, not angles: there is no figure 'beta'"
-        raise MechanismError(Finding(what, "--kind", "see the figure 'seat'"))
     return Plot("Seats over the run", [Panel("", charts, 0.8 + 2.3 * len(charts))])
 
 
@@ -421,9 +405,7 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     Of a result of `locking` also the critical multiple of each joint, and the efficiency backward. Efficiencies beyond
     ±1 are left out: there the driver hardly works beside springs and masses.
     """
-    margin = column(result, "locking_margin")
-    if margin is None or not has_friction(result):
-        raise MechanismError(Finding("no joint has friction, so nothing can lock", "locking", "state friction"))
+    margin = np.asarray(result["locking_margin"].values, float)
     over, alone = abscissa(result), members(result, "critical_multiple", "joint")
     every = np.concatenate([margin, *alone.values()])
     largest = float(np.max(every[np.isfinite(every)], initial=0.0))
@@ -505,20 +487,24 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {
     "seat": seat, "beta": beta, "locking": locking, "measures": measures,
 }  # fmt: skip
 KINDS = PLOTS
-# whether a result has what a figure needs that not all results have
-READY: dict[str, Callable[[xr.Dataset], bool]] = {
-    "speed": lambda result: bool(varying(result)),
-    "error": lambda result: "point_error" in result,
-    "seat": lambda result: any(not seats.planar_guide for seats in seated(result)),
-    "beta": lambda result: bool(_seat_courses(result)),
-    "locking": has_friction,
-    "measures": lambda result: bool(drawn_measures(result)),
-}
+# of a figure that not all results have: whether a result has it, what it lacks otherwise, and what to do
+PINS = "state a clearance and seat: loaded of a joint (--set joint_defaults.seat=loaded)"
+READY: dict[str, tuple[Callable[[xr.Dataset], bool], str, str]] = {
+    "speed": (lambda result: bool(varying(result)), "the speed of no driver varies",
+              "use `trunnion simulate --steady`, or a motion law"),
+    "error": (lambda result: "point_error" in result, "the mechanism has no errors",
+              "state errors, a misalignment, or a seat: loaded (--set joint_defaults.seat=loaded)"),
+    "seat": (lambda result: any(not seats.planar_guide for seats in seated(result)), "no pin has a known seat", PINS),
+    "beta": (lambda result: bool(_seat_courses(result)), "no pin or guide has a known seat", PINS),
+    "locking": (has_friction, "no joint has friction, so nothing can lock", "state friction"),
+    "measures": (lambda result: bool(drawn_measures(result)), "no measure has one number at every position",
+                 "state measures: in the model"),
+}  # fmt: skip
 
 
 def drawable(result: xr.Dataset) -> list[str]:
     """The kinds of figures that a result has something for."""
-    return [name for name in PLOTS if name not in READY or READY[name](result)]
+    return [name for name in PLOTS if name not in READY or READY[name][0](result)]
 
 
 def figure(
@@ -529,6 +515,9 @@ def figure(
     at: a place such as "60deg", at which the mechanism is drawn.
     """
     check_kind(kind, PLOTS)
+    ready, lacks, remedy = READY.get(kind, (lambda _: True, "", ""))
+    if not ready(result):
+        raise MechanismError(Finding(f"{lacks}: there is no figure '{kind}'", "--kind", remedy))
     index = None if at is None else position_at(result, at)
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     return mechanism(result, ideal, index) if kind == "mechanism" else PLOTS[kind](result, ideal)

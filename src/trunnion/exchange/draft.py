@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.pairs import PAIRS
 
 __all__ = ["MATERIALS", "Array", "Body", "Draft", "ImportOptions", "Pair", "Place", "components", "few", "free_name",
@@ -189,11 +189,11 @@ class Draft:
 
     def warn(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
         """Note a doubt; code: of the list in the manual, `exchange.…`."""
-        self.findings.append(Finding.warning(code, where, what, remedy, **figures))
+        self.findings.append(Finding.weighed(Severity.WARNING, code, where, what, remedy, **figures))
 
     def note(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
         """Note something that is lost or assumed."""
-        self.findings.append(Finding.note(code, where, what, remedy, **figures))
+        self.findings.append(Finding.weighed(Severity.NOTE, code, where, what, remedy, **figures))
 
     def assumed_unit(self, options: ImportOptions) -> float:
         """The length unit of a file that states none, m; a doubt unless the user states it."""

@@ -59,19 +59,16 @@ BAD = {
     "an empty value": (["--over", "AB=1m,,2m"], "AB"),
     "unknown name": (["--over", "AX=1m,2m"], "no number named 'AX'"),
     "one without unit": (["--over", "AB=1000:2m:3"], "1000.0 has no unit"),
-    "seven": ([text for i in range(7) for text in ("--over", f"n{i}=1m")], "7 names"),
     "too many": (["--over", "AB=1m:2m:100001"], "100,001 points"),
     "impossible": (["--over", "crank.mass=1kg,-1kg"], "negative"),
     "unknown measure": (["--over", "AB=1m,2m", "--measure", "efficency"], "did you mean 'efficiency'"),
     "measure of a stranger": (["--over", "AB=1m,2m", "--measure", "Z.reaction_max"], "reaction_max"),
     "unknown format": (["--over", "AB=1m,2m", "--out", "r.xyz"], ".svg"),
-    "no steps": (["--over", "AB=1m,2m", "--steps", "0"], "0 positions"),
     "two in one file": (
         ["--over", "AB=1m", *(f"--measure={one}" for one in ("efficiency", "status")), "--out=a.svg"],
         "2 figures do not fit one file — give one --measure",
     ),
     "axis of a stranger": (["--over", "AB=1m,2m", "--x", "BC"], "'BC' is not swept over"),
-    "unknown kind": (["--over", "AB=1m,2m", "--kind", "contour"], "no figure 'contour'"),
 }
 
 

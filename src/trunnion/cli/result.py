@@ -13,12 +13,12 @@ from trunnion.cli.options import IMAGES, Files, Model, placed
 from trunnion.cli.terminal import line, say, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.results.attributes import findings_of, summary_of
-from trunnion.results.dataset import Result
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
+    from trunnion.results.dataset import Result
 
 __all__ = ["PAGES", "YAML", "Shown", "check_files", "check_model", "check_target", "end", "exit_status", "show_tables",
            "write_text"]  # fmt: skip
@@ -123,6 +123,8 @@ class Shown:
     @property
     def dataset(self) -> xr.Dataset:
         """The result as files take it."""
+        from trunnion.results.dataset import Result  # with NumPy, which help does not need
+
         return self.result.dataset if isinstance(self.result, Result) else self.result
 
     @property

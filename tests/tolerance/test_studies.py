@@ -144,49 +144,20 @@ def test_refused_with_a_finding(name: str) -> None:
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-SLIDER = {
-    "dimensions": {"r": "60 mm ± 0.1 mm", "k": "200 mm ± 0.15 mm"},
-    "links": {
-        "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
-        "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
-        "rod": {"points": {"P": [0, 0], "Q": ["k", 0]}},
-        "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "T": ["k", 0]}},
-    },
-    "joints": {
-        "O": {"type": "revolute", "links": ["ground", "crank"]},
-        "P": {"type": "revolute", "links": ["crank", "rod"]},
-        "Q": {"type": "revolute", "links": ["rod", "ram"]},
-        "S": {"type": "prismatic", "links": ["ground", "ram"]},
-    },
-    "joint_defaults": {"pin": {"radius": "15 mm", "clearance": "20 um"}},
-    "drivers": {"O": {"speed": "60 rpm"}},
-    "assembly": {"Q": ["260 mm", 0]},
-    "measures": {"tip": {"point": "ram.T", "axis": "x", "limit": "±0.6 mm"}},
-    "tolerances": {"O.pin.clearance": "+0.01/0 mm"},
-    "costs": {
-        "k": {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.3 mm"},
-        "O.clearance": {"model": "power", "B": 0.3, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.05 mm"},
-    },
-}  # fmt: skip
-
-
-def slider(**more: Any) -> Mechanism:
-    return Mechanism(**{"trunnion": 1, **SLIDER, **more})
-
-
-def coded(result: Any, code: str) -> list[Any]:
-    found = findings_of(result) if "findings" in getattr(result, "attrs", {}) else result.findings
-    return [one for one in found if one.code == code]
 
 
 def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
-    """k is the length of the rod and that of the ram: one number for two parts."""
-    for result in (trunnion.check(slider()), trunnion.tolerance(slider(), methods=["linear"], steps=12)):
-        (found,) = coded(result, "tolerance.shared_dimension")
-        assert found.where == "dimensions.k"
-        assert found.figures["links"] == ["rod", "ram"]
-        assert "rod.Q.x" in found.what
-        assert "ram.T.x" in found.what
+    """l3 is the length of the coupler and that of the rocker: one number for two parts."""
+    data = fourbar().data()
+    data["links"]["rocker"]["points"]["C"] = ["l3", 0]
+    mechanism = Mechanism(**data)
+    for result in (trunnion.check(mechanism), trunnion.tolerance(mechanism, methods=["linear"], steps=12)):
+        said = findings_of(result) if hasattr(result, "attrs") else result.findings
+        (found,) = [one for one in said if one.code == "tolerance.shared_dimension"]
+        assert found.where == "dimensions.l3"
+        assert found.figures["links"] == ["coupler", "rocker"]
+        assert "coupler.C.x" in found.what
+        assert "rocker.C.x" in found.what
 
 
 PLAYS = ("O", "A", "P", "K")

@@ -102,7 +102,25 @@ def _cost_of(price: Price, t: float) -> float:
 
 def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
     """The result with the numbers of the allocation. toleranced: of the mechanism with these tolerances."""
-    arrays = {**_by_parameter(allocated, toleranced), **_by_measure(allocated, toleranced), **_totals(allocated)}
+    answer = allocated.answer
+    arrays = {**_by_parameter(allocated, toleranced), **_by_measure(allocated, toleranced)}
+    before = [_cost_of(price, allocated.before[name]) for name, price in allocated.prices.items()]
+    totals = {
+        "cost_total": answer.cost,
+        "cost_total_before": sum(before),
+        "cost_bound": answer.bound,
+        "gap": answer.gap,
+    }
+    if allocated.criterion == "yield":
+        totals["yield_expected"] = answer.expected
+    if answer.checked is not None:
+        totals |= {
+            f"yield_checked{end}": share for end, share in zip(("", "_low", "_high"), answer.checked, strict=True)
+        }
+    arrays |= {name: np.array(total) for name, total in totals.items()}
+    if allocated.offers:
+        arrays["trade_off_factor"] = np.array([factor for factor, _ in allocated.offers])
+        arrays["trade_off_cost"] = np.array([offer.cost for _, offer in allocated.offers])
     parameters = MemberUnits("parameter", units_along(toleranced["parameter_nominal"], "parameter"))
     saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(toleranced["nominal"], "measure")])
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
@@ -183,26 +201,6 @@ def _by_measure(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
         if allocated.answer.found:
             arrays["yield_margin"][rows.measure] = allocated.answer.problem.margins()
     return arrays
-
-
-def _totals(allocated: Allocated) -> Mapping[str, Any]:
-    """What is of all tolerances together, and of the curve of cost over accuracy."""
-    answer, before = allocated.answer, allocated.before
-    arrays: dict[str, Any] = {
-        "cost_total": answer.cost,
-        "cost_total_before": sum(_cost_of(price, before[name]) for name, price in allocated.prices.items()),
-        "cost_bound": answer.bound,
-        "gap": answer.gap,
-    }
-    if allocated.criterion == "yield":
-        arrays["yield_expected"] = answer.expected
-    ends = ("", "_low", "_high")
-    if answer.checked is not None:
-        arrays |= {f"yield_checked{end}": share for end, share in zip(ends, answer.checked, strict=True)}
-    if allocated.offers:
-        arrays["trade_off_factor"] = [factor for factor, _ in allocated.offers]
-        arrays["trade_off_cost"] = [offer.cost for _, offer in allocated.offers]
-    return {name: np.array(array) for name, array in arrays.items()}
 
 
 # ---- summary and findings --------------------------------------------------------------------------------------

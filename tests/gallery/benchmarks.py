@@ -8,9 +8,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import fsolve
 
-from gallery.entry import Entry, Outcome
+from gallery.entry import Entry, Outcome, bend, corner, slope
 from gallery.four_bars import torque_at_60
-from gallery.plane import bend, corner, slope
 from trunnion.solve.run import prepare
 
 # five-bar-robot: what the process force asks of the left motor

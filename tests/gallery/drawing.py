@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import fsolve
 
-from gallery.entry import STEPS, Entry, Outcome
-from gallery.plane import corner
+from gallery.entry import STEPS, Entry, Outcome, corner
 
 
 # peaucellier: the pen stays on x = (L² − m²)/(2r)

@@ -1,4 +1,4 @@
-"""What the gallery says of an example: one checked fact, and how it is drawn."""
+"""What the gallery says of an example: one checked fact, and how it is drawn; linkages closed by hand for the facts."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from trunnion import Mechanism, analyse
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["STEPS", "Entry", "Outcome"]
 
 STEPS = 72  # positions of the result that a fact is read from
 
@@ -58,3 +58,26 @@ class Entry:
     figures: tuple[str, ...] = ("mechanism",)
     lost: int = 0
     errors: tuple[str, ...] = field(default=())
+
+
+# ---- closure by hand: points as complex numbers, m ----
+
+
+def corner(a: complex, b: complex, ac: float, bc: float, side: int) -> complex:
+    """C with |AC| = ac and |BC| = bc, left of the line from A to B if side is +1, right of it if −1. Takes arrays.
+
+    With u = AB/|AB|: C = A + (p + i side q) u, p = (AB² + ac² − bc²)/(2 AB), q² = ac² − p².
+    """
+    d = np.abs(b - a)
+    p = (d**2 + ac**2 - bc**2) / (2 * d)
+    return a + (p + 1j * side * np.sqrt(ac**2 - p**2)) * (b - a) / d
+
+
+def slope(f: Callable[[float], complex], x: float, h: float = 1e-4) -> complex:
+    """f'(x) by differences of fourth order."""
+    return (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h)
+
+
+def bend(f: Callable[[float], complex], x: float, h: float = 1e-3) -> complex:
+    """f''(x) by differences of fourth order."""
+    return (16 * (f(x + h) + f(x - h)) - (f(x + 2 * h) + f(x - 2 * h)) - 30 * f(x)) / (12 * h * h)

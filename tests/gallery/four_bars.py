@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import trunnion
-from gallery.entry import Entry, Outcome
-from gallery.plane import bend, corner, slope
+from gallery.entry import Entry, Outcome, bend, corner, slope
 
 
 # durango-fourbar: the crank's torque without friction at 60°, by virtual work

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import trunnion
-from gallery.entry import Entry, Outcome
-from gallery.plane import corner
+from gallery.entry import Entry, Outcome, corner
 from trunnion.results.attributes import attribute
 
 # landing-gear: how long it falls

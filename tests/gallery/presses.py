@@ -8,8 +8,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 import trunnion
-from gallery.entry import STEPS, Entry, Outcome
-from gallery.plane import corner
+from gallery.entry import STEPS, Entry, Outcome, corner
 from trunnion.solve.run import prepare
 from trunnion.studies import design
 

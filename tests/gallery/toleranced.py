@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 
 import trunnion
-from gallery.entry import STEPS, Entry, Outcome
-from gallery.plane import corner, slope
+from gallery.entry import STEPS, Entry, Outcome, corner, slope
 from gallery.spatial import rocker_of_rssr
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.measures.curves import value

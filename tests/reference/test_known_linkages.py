@@ -12,8 +12,7 @@ import trunnion
 from brief import brief
 from gallery.benchmarks import butterfly, butterfly_torque
 from gallery.drawing import turns
-from gallery.entry import STEPS
-from gallery.plane import slope
+from gallery.entry import STEPS, slope
 from gallery.presses import jaw_angle
 from mechanisms import DURANGO
 from trunnion import FrictionMethod, Status

@@ -182,11 +182,3 @@ def test_sweep() -> None:
     assert page.count("<img") == 2
     for value in result["efficiency"].values:
         assert f">{value:.6g}</td>" in page
-
-
-def test_names_cannot_become_code(tmp_path: Path) -> None:
-    text = (EXAMPLES / "fourbar-with-play.yaml").read_text("utf-8")
-    named = re.sub(r"^name:.*$", 'name: "<script>alert(1)</script>"', text, count=1, flags=re.MULTILINE)
-    (tmp_path / "model.yaml").write_text(named, "utf-8")
-    page = _page(trunnion.report(play(read(tmp_path / "model.yaml"), steps=6)))
-    assert "&lt;script&gt;" in page

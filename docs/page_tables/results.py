@@ -185,8 +185,10 @@ def _codes_in(file: Path) -> dict[str, tuple[str, str]]:
                 text, kind = call.args[0], " or ".join(weights) or "error"
             elif maker == "Finding.weighed" and isinstance(name := call.args[1], ast.Constant):
                 text, kind = call.args[3], " or ".join(weights)
-            elif maker in ("Finding.note", "Finding.warning", "Finding.error"):
-                name, text, kind = call.args[0], call.args[2], maker.removeprefix("Finding.")
+            elif maker in ("Finding.note", "Finding.warning", "Finding.error") and isinstance(
+                name := call.args[0], ast.Constant
+            ):
+                text, kind = call.args[2], maker.removeprefix("Finding.")
             else:
                 continue
             said = _text(text, function)

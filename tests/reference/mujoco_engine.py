@@ -1,8 +1,8 @@
 """A mechanism of the shared tables in MuJoCo, a multibody engine that has neither code nor coordinates of Trunnion's.
 
 The engine has a spanning tree (driven joints and guides in it, some pins cut) and gives its own kinematics, inverse
-dynamics, Jacobians of the cut pins and forces between bodies. Here the loops are closed by Newton on those Jacobians.
-No friction.
+dynamics, Jacobians of the cut pins and forces between bodies. Here the loops are closed by Newton on those Jacobians
+and friction is iterated from the engine's forces: M = f r |F| at a pin, f times the load of both ends in a guide.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def element(data: Data, link: str, joint: str) -> tuple[Array, float]:
 class Engine:
     """A mechanism in MuJoCo. Forces, speeds and coordinates of a joint are of its second link against the first."""
 
-    def __init__(self, data: Data) -> None:
-        self.data = data
+    def __init__(self, data: Data, radius: float, guide: float) -> None:
+        self.data, self.radius, self.guide = data, radius, guide
         self.joints, self.drivers = data["joints"], list(data["drivers"])
         spec = mj.MjSpec()
         spec.option.gravity = spatial(*data["gravity"])
@@ -120,26 +120,54 @@ class Engine:
         second[3:] += self.model.opt.gravity  # the engine counts the ground as accelerated against gravity
         return velocity[[3, 4, 2]], second[[3, 4, 2]]
 
-    def forces(self) -> tuple[dict[str, Array], dict[str, float]]:
-        """Reactions (x, y, moment about the joint's point on the second link) and drive efforts."""
+    def speed(self, joint: str) -> float:
+        """Relative speed along the freedom."""
+        if joint in self.dof:
+            return float(self.sense[joint] * self.state.qvel[self.dof[joint]])
+        one, two = (0.0 if n == "ground" else self.motion(n, joint)[0][2] for n in self.joints[joint]["links"])
+        return float(two - one)
+
+    def forces(self, coefficient: float) -> tuple[dict[str, Array], dict[str, float], dict[str, float]]:
+        """Reactions (x, y, moment about the joint's point on the second link), friction, drive efforts."""
+        friction, speed = dict.fromkeys(self.joints, 0.0), {name: self.speed(name) for name in self.joints}
+        seen: list[dict[str, float]] = []  # rounding may go round in a circle of the same bits
+        for _ in range(60):
+            cut, drive = self._balance(friction)
+            reactions = {name: self._reaction(name, cut) for name in self.joints}
+            last = friction
+            loads = {name: coefficient * self._normal(name, *reactions[name]) for name in self.joints}
+            friction = {name: -np.sign(speed[name]) * load for name, load in loads.items()}
+            if (
+                all(abs(friction[n] - last[n]) <= 1e-15 * np.max(np.abs(reactions[n])) for n in friction)
+                or friction in seen
+            ):
+                return reactions, friction, drive
+            seen.append(friction)
+        raise AssertionError("friction does not settle")
+
+    def _balance(self, friction: dict[str, float]) -> tuple[dict[str, Array], dict[str, float]]:
+        """Forces in the cut pins and drive efforts that, with loads and friction, give the motion; both are applied."""
         state, applied = self.state, np.zeros(self.size)
         state.xfrc_applied[:] = 0.0
         for load in self.data.get("loads", {}).values():
             at = self.place(load["link"], load["at"]) if "at" in load else state.body(load["link"]).xpos
             self._apply(load["link"], spatial(*load.get("force", (0, 0))), load.get("moment", 0.0), at, applied)
-        # in the cut pins, and of the drives, what with the loads gives the motion
+        for name, value in friction.items():
+            if name in self.dof:
+                applied[self.dof[name]] += self.sense[name] * value
+            else:
+                self._press(name, np.zeros(3), value, applied)
         found = np.linalg.solve(self.rows().T, state.qfrc_inverse - applied)
         cut = {name: spatial(*found[2 * k : 2 * k + 2]) for k, name in enumerate(self.cuts)}
         for name, force in cut.items():
-            self._press(name, force, applied)
+            self._press(name, force, 0.0, applied)
         mj.mj_rnePostConstraint(self.model, state)
-        efforts = dict(zip(self.drivers, found[2 * len(self.cuts) :], strict=True))
-        return {name: self._reaction(name, cut) for name in self.joints}, efforts
+        return cut, dict(zip(self.drivers, found[2 * len(self.cuts) :], strict=True))
 
-    def _press(self, cut: str, force: Array, into: Array) -> None:
+    def _press(self, cut: str, force: Array, moment: float, into: Array) -> None:
         """Load the second link of a cut pin, and the first with the opposite."""
         for link, sign in zip(self.joints[cut]["links"], (-1.0, 1.0), strict=True):
-            self._apply(link, sign * force, 0.0, self.place(link, cut), into)
+            self._apply(link, sign * force, sign * moment, self.place(link, cut), into)
 
     def _apply(self, link: str, force: Array, moment: float, at: Array, into: Array) -> None:
         """A load on a body, as the engine has it, and as generalised forces."""
@@ -161,3 +189,10 @@ class Engine:
         axis = self.state.joint(joint).xaxis
         force = wrench[3:] - axis * (axis @ wrench[3:])
         return spatial(*force[:2]) + Z * (wrench[2] + np.cross(about, wrench[3:])[2])
+
+    def _normal(self, joint: str, x: float, y: float, moment: float) -> float:
+        """Normal load of a guide on its two ends; of a pin times its radius."""
+        if self.joints[joint]["type"] == "revolute":
+            return self.radius * float(np.hypot(x, y))
+        across = float(np.hypot(x, y)) * np.sign(np.cross(self.state.joint(joint).xaxis, [x, y, 0.0])[2])
+        return float(abs(across / 2 + moment / self.guide) + abs(across / 2 - moment / self.guide))

@@ -479,7 +479,7 @@ SLIDER_CRANK: dict[str, Any] = {  # a slider-crank; the flywheel is in the crank
 
 def by_engine(start: tuple[float, float], times: Array) -> Array:
     """Crank angle and rate at some times, (2, time)."""
-    engine = Engine(SLIDER_CRANK)
+    engine = Engine(SLIDER_CRANK, 0.0, 1.0)
     lean = -np.arcsin(0.035 / 0.12 * np.sin(start[0]))  # of the rod, which tells the assembly
     guesses, q = {"S": 0.14, "P": lean - start[0], "Q": -lean}, np.zeros(engine.size)
     for name, dof in engine.dof.items():

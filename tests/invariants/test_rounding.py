@@ -166,6 +166,7 @@ def test_a_floor_follows_the_dimension_of_its_unit(length: float, rate: float, f
         if name != "1/s":
             assert floor(name) == pytest.approx(unit * size, rel=1e-9)
     assert np.isnan(floor("of its RMS"))
+    assert Scales(length, 1e160, force).floor("m/s^2") == 0.0  # the rate squared is no number
 
 
 def test_a_speed_near_the_end_of_the_floats_has_an_answer() -> None:

@@ -362,9 +362,9 @@ def _rough(cycle: Cycle) -> Iterator[Finding]:
     if course is not None and not cycle.run.seats and course.courses.loosened > 1.0:
         share = course.courses.loosened * tolerance
         what = (
-            f"something changes so finely over the cycle that its figures are known to {share:.1g} of the largest alone"
+            f"something changes very finely over the cycle: its figures are accurate to {share:.1g} of the largest only"
         )
-        remedy = "look for loads, laws or tables that change many times over the cycle, or at random"
+        remedy = "look for singular positions, and for loads, laws or tables that change many times, or at random"
         yield Finding.warning("cycle.rough", "", what, remedy, share=share)
 
 

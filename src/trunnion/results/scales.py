@@ -53,13 +53,12 @@ class Scales(NamedTuple):
         Returns
         -------
         float
-            In that unit; NaN, which nothing is below, of what is no unit of mechanics.
+            In that unit; 0 where no scale is known, NaN, which nothing is below, of what is no unit of mechanics.
         """
         powers, factor = _powers(unit)
-        if any(size == 0 and power < 0 for size, power in zip(self, powers, strict=True)):
-            return 0.0
-        size: float = math.prod(size**power for size, power in zip(self, powers, strict=True))
-        return ROUNDING * size / factor
+        with np.errstate(all="ignore"):  # of nothing at rest, and of rates of 1e160 1/s
+            size = float(np.prod(np.power(self, powers)))
+        return ROUNDING * size / factor if math.isfinite(size) else 0.0
 
     def zeroed(self, values: Array, unit: str) -> Array:
         """The values in a unit, 0 where they are rounding."""

@@ -167,6 +167,9 @@ def codes_table() -> str:
     return rows_of(("code", "is", "says"), [(code(name), *row) for name, row in sorted(rows.items())])
 
 
+KINDS = {".note": "note", ".warn": "warning", ".warning": "warning", ".error": "error"}  # by the method that makes it
+
+
 def _codes_in(file: Path) -> dict[str, tuple[str, str]]:
     """Severity and sentence of the findings that a module makes, by their code."""
     rows = {}
@@ -185,10 +188,8 @@ def _codes_in(file: Path) -> dict[str, tuple[str, str]]:
                 text, kind = call.args[0], " or ".join(weights) or "error"
             elif maker == "Finding.weighed" and isinstance(name := call.args[1], ast.Constant):
                 text, kind = call.args[3], " or ".join(weights)
-            elif maker in ("Finding.note", "Finding.warning", "Finding.error") and isinstance(
-                name := call.args[0], ast.Constant
-            ):
-                text, kind = call.args[2], maker.removeprefix("Finding.")
+            elif maker.endswith(tuple(KINDS)) and len(call.args) > 2 and isinstance(name := call.args[0], ast.Constant):
+                text, kind = call.args[2], KINDS[f".{maker.rpartition('.')[2]}"]
             else:
                 continue
             said = _text(text, function)

@@ -116,6 +116,16 @@ def test_nothing_is_interpolated_across_a_jump(clean: Columns, tmp_path: Path) -
     assert np.max(np.abs(one.courses["torque-in"].turns - true)[:, beside]) < 1e-3
 
 
+@pytest.mark.parametrize("width", [0.005, 0.01, 0.02])
+def test_a_narrow_peak_is_no_jump(clean: Columns, tmp_path: Path, width: float) -> None:
+    """A normal peak of 4 N m, its standard deviation a share of a turn of 500 samples: by cubics, h⁴/40 of d⁴/dt⁴."""
+    peak = np.exp(-((np.mod(clean["angle"] / (2 * np.pi), 1.0) - 0.4) ** 2) / (2 * width**2))
+    changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0, "positions": 360}
+    (one,) = read({**clean, "T1": 0.4 * peak}, tmp_path, changes).conditions
+    true = 4 * np.exp(-((one.phase - 0.4) ** 2) / (2 * width**2))
+    assert np.max(np.abs(one.courses["torque-in"].mean - true)) < 4 * 3 / (500 * width) ** 4 / 40
+
+
 def test_averaging_lessens_noise(tmp_path: Path) -> None:
     """Of n samples a position and N turns the mean scatters by σ/√(n N), and the standard uncertainty says so."""
     columns = recorded(turns=60, noise=0.5, seed=3)

@@ -42,7 +42,7 @@ _PER_MINUTE = re.compile(r"1\s*/\s*[Mm]in|[Mm]in\^?-1")  # in a heading; in a mo
 TURN = 2 * np.pi
 DENSE = 4.0  # samples a position from which they are averaged
 STANDING = 0.2  # of the usual speed, below which the drive is taken to stand
-JUMP = 8.0  # times what nine in ten samples rise by: noise and curves stay below it
+JUMP = 8.0  # times what nine in ten samples, and those beside, rise by: noise and curves stay below it
 APART = 0.5  # of the usual length of a turn, by which one may differ from it
 ALIKE = 0.9  # of 1, from which every turn is sampled at the same places
 HARMONICS = 10  # of the wave, that are looked at
@@ -357,10 +357,10 @@ def _interpolated(turns: Turns, values: Array) -> Array:
     four = np.clip(after[:, None] + np.arange(-2, 2), 0, x.size - 1)
     apart = np.diff(seconds[four], axis=1)
     smooth = np.isfinite(y[four]).all(axis=1) & ((apart > 0) & (apart < 3 * step)).all(axis=1)
-    rises = np.abs(np.diff(y))
-    if (rises > 0).any():
-        usual_rise = float(np.percentile(rises[rises > 0], 90))
-        smooth &= ~(np.abs(np.diff(y[four], axis=1)) > JUMP * usual_rise).any(axis=1)
+    rises = np.nan_to_num(np.abs(np.diff(y, append=y[-1])))
+    if (rises > 0).any():  # a flank of a narrow peak rises as fast beside, too
+        largest = np.maximum(np.maximum(np.roll(rises, 1), np.roll(rises, -1)), np.percentile(rises[rises > 0], 90))
+        smooth &= ~(rises > JUMP * largest)[four[:, :-1]].any(axis=1)
     near, by_cubic = x[four[smooth]], np.zeros(int(np.count_nonzero(smooth)))
     for i in range(4):  # Lagrange's form
         factors = [(at[smooth] - near[:, j]) / (near[:, i] - near[:, j]) for j in range(4) if j != i]

@@ -249,6 +249,15 @@ def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path: Path) ->
     assert "hidden layer notes" in left
 
 
+def test_a_drawing_in_space_is_read_flat_with_a_warning(tmp_path: Path) -> None:
+    document = drawing(**four_bar())
+    for circle in document.modelspace().query('CIRCLE[layer=="crank"]'):
+        circle.translate(0, 0, 7)
+    draft = read(document, tmp_path)
+    assert {finding.severity for finding in draft.findings if finding.code == "exchange.flat"} == {"warning"}
+    assert set(draft.pairs) == set(FOUR_BAR)
+
+
 def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path: Path) -> None:
     document = drawing(ground=[("circle", A, PIN)])
     draw(document.blocks.new("arm"), "zero", [("circle", A, HOLE), ("circle", (50, 0), PIN)])

@@ -184,6 +184,13 @@ OUTSIDE = '<!DOCTYPE r SYSTEM "file:///etc/passwd">'
 JUNK = np.random.default_rng(1).bytes(50_000)
 HEAD = "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n"
 GLB = struct.pack("<4sII", b"glTF", 2, 100) + struct.pack("<I4s", 80, b"JSON") + b'{"asset":'
+TRIANGLE = json.dumps({
+    "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "buffers": [{"byteLength": 48}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                  {"bufferView": 1, "componentType": 5125, "count": 3, "type": "SCALAR"}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+}).ljust(660).encode()  # fmt: skip
 COMPONENT = '<object id="1"><components><component objectid="1"/></components></object>'
 PART = '<D><Objects><Object type="App::Part" name="A"/></Objects><ObjectData><Object name="A"/></ObjectData></D>'
 HOSTILE: dict[str, dict[str, bytes | str | Callable[[Path], object]]] = {
@@ -236,7 +243,13 @@ HOSTILE: dict[str, dict[str, bytes | str | Callable[[Path], object]]] = {
         "text": "solid für Gäste\nfacet\n".encode() * 100,
         "count": b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 500,
     },
-    ".glb": {"cut": GLB, "nothing": struct.pack("<4sIII4s", b"glTF", 2, 24, 4, b"JSON") + b"{}  "},
+    ".glb": {
+        "cut": GLB,
+        "nothing": struct.pack("<4sIII4s", b"glTF", 2, 24, 4, b"JSON") + b"{}  ",
+        "no corner": struct.pack("<4sIII4s", b"glTF", 2, 76 + len(TRIANGLE), len(TRIANGLE), b"JSON")
+        + TRIANGLE
+        + struct.pack("<I4s9f3I", 48, b"BIN\0", *range(9), 0, 1, 9),
+    },
     ".FCStd": {
         "entities": lambda path: zipped(path, f"{BOMB}<D>&b;</D>", "Document.xml"),
         "open": lambda path: zipped(path, "<Document><Objects>", "Document.xml"),

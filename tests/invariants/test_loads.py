@@ -359,6 +359,12 @@ REFUSED: list[tuple[str, Any, str]] = [
 ]
 
 
+def test_what_is_so_anyway_may_be_stated() -> None:
+    load = {"joint": "D", "resisting_torque": 1.0}
+    stated, plain = (Mechanism(**(four_bar() | {"loads": {"load": load | more}})) for more in ({"frame": "global"}, {}))
+    assert stated.parameters() == plain.parameters()
+
+
 @pytest.mark.parametrize(("kind", "stated", "words"), REFUSED)
 def test_what_makes_no_sense_is_refused(kind: str, stated: Any, words: str) -> None:
     if kind == "spring":

@@ -130,7 +130,7 @@ def compare(
     parameter="A parameter, named as in --set; NAME=PATH,PATH,… for several with one common value. Repeatable.",
     channel="A channel by its name in the mapping. Repeatable; default: all usable ones.",
     start="NAME=VALUE: start value; default: the value in the model.",
-    hold_out="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable.",
+    hold_out="A condition by its name, NAME=VALUE or file, for validation instead of the fit. Repeatable.",
     guard="Positions left out on each side of a friction reversal.",
     kind="Which figure: intervals or residuals.",
 )

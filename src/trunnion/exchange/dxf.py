@@ -123,7 +123,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
         draft.lose(f"{number} {kind}")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
-        draft.lose("heights along z")
+        draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
     _Reader(sketch, draft, options, size).read()
     draft.lose("masses, which a DXF does not hold")
     return draft

@@ -98,6 +98,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
 
 def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: float) -> Body:
     """A body with the mass of a closed mesh; one that is open has none, and says so."""
+    if np.any(faces >= len(vertices)) or np.any(faces < 0):
+        raise refused("cannot be read as a mesh, or is damaged")
     body, mesh = Body(name), trimesh.Trimesh(vertices, faces, process=True)
     if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
         draft.warn("exchange.mesh", f"links.{name}", "has no triangles, or corners that are no numbers")

@@ -198,7 +198,7 @@ class OnlyWith(Rule):
 
 
 class NotWith(Rule):
-    """A key that is not stated beside any of some others."""
+    """A key that is not stated beside any of some others, but for what it is anyway."""
 
     def __init__(self, *keys: str) -> None:
         self.keys = keys
@@ -206,7 +206,7 @@ class NotWith(Rule):
     def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """A finding if one of the others is stated."""
         others = [other for other in self.keys if getattr(part, other) is not None]
-        if key in part.model_fields_set and others:
+        if others and getattr(part, key) != type(part).model_fields[key].default:
             yield Finding(f"is stated beside {' and '.join(others)}", f"{where}.{key}", "state one of them")
 
 

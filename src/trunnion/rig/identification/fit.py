@@ -9,6 +9,7 @@ within a turn neighbours may be correlated as they like.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -326,10 +327,9 @@ def corners(value: Array, uncertainty: Array, *, closed: bool, guard: int) -> Ma
     usual = median_filter(bend, NEARBY, mode="wrap" if closed else "nearest")
     off = ROUNDED * (bend - usual) / np.maximum(uncertainty, 1e-300)
     off[(bend <= STANDS_OUT * usual) | (off <= TOO_MUCH)] = 0.0
-    for least in np.unique(off[off > 0]):
-        if np.mean(about := beside(off >= least, guard)) <= MOST:
-            return about
-    return np.zeros(len(value), bool)
+    sizes = np.append(np.unique(off[off > 0]), np.inf)  # the least from which on not too many are left out
+    k = bisect_left(range(len(sizes) - 1), True, key=lambda i: bool(np.mean(beside(off >= sizes[i], guard)) <= MOST))
+    return beside(off >= sizes[k], guard)
 
 
 def beside(mask: Mask, guard: int) -> Mask:

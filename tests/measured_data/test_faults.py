@@ -236,3 +236,5 @@ def test_sampling_too_slow(run: Columns, tmp_path: Path) -> None:
     assert "data.sampling.slow" in codes(read(thin, tmp_path))
     with pytest.raises(MechanismError, match=r"sampling is too slow for the filter: 50 Hz, a cut-off of 40 Hz"):
         read(thin, tmp_path, {"filter": {"cut_off": "40 Hz"}})
+    with pytest.raises(MechanismError):
+        read(thin, tmp_path, {"filter": {"cut_off": "2e-298 Hz"}})

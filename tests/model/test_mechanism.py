@@ -295,3 +295,5 @@ def test_no_coordinate_stands_for_an_end_of_a_range() -> None:
     for wrong in ("x", "y", "form"):
         with pytest.raises(MechanismError, match="no number named"):
             press.with_values({f"drivers.{name}.range.{wrong}": 0.1})
+    with pytest.raises(MechanismError, match="no number of seconds is long enough"):
+        press.with_values({f"drivers.{name}.range.to": 1e308, f"drivers.{name}.speed": 1e-3})

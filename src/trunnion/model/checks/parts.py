@@ -78,8 +78,11 @@ def driver_values(mechanism: Numbers, name: str, values: Values) -> Iterator[Fin
              "end it where it begins, or whole turns from there, or state periodic: false"),
         )  # fmt: skip
     engaged, opened = value("motor.clutch_from", 0.0), value("motor.clutch_until", np.inf)
+    with np.errstate(all="ignore"):
+        lasts = np.divide(value("range.to") - value("range.from"), value("speed"))
     yield from faults(
         where,
+        (np.isinf(lasts), "range", "no number of seconds is long enough to pass the range at the speed"),
         (value("range.from") == value("range.to"), "range", f"the range begins and ends at {value('range.from'):g}"),
         *((value(f"motor.{effort}") * value(f"motor.{speed}") < 0, f"motor.{effort}",
            f"the motor drives away from its {speed}: their signs differ")

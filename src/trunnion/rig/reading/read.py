@@ -173,7 +173,8 @@ class _Recording:
         self.running = slice(int(first), int(np.searchsorted(self.line.seconds, self.turns.end[-1], "right")))
         reach = float(np.median(self.turns.end - self.turns.begin)) / mapping.positions
         reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
-        near = slice(max(first - (width := channels.WIDTH + int(reach / self.line.step)), 0), int(last) + width)
+        width = channels.WIDTH + int(min(reach / self.line.step, len(self.line.seconds)))
+        near = slice(max(first - width, 0), int(last) + width)
         for name, channel in mapping.channels.items():
             moves = not channel.measures.startswith("rate:")
             for finding in channels.faults(f"channels.{name}", self.readings[name], self.turns, near, moves):

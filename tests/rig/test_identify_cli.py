@@ -10,8 +10,7 @@ import xarray as xr
 
 from trunnion.cli.app import main
 from trunnion.model.mechanism import read_mechanism
-from trunnion.rig import identification
-from trunnion.rig.identification.identify import identify
+from trunnion.rig.identification import identify as identification
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = "pezzuti-cardan.yaml"
@@ -63,7 +62,7 @@ def test_estimates_of_a_model_that_does_not_fit_are_not_written(  # type: ignore
     folder: Path, call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The crank angle 10° off: a coefficient that makes up for it is no coefficient of friction."""
-    results = []
+    results, identify = [], identification.identify
 
     def once(*numbers: object, **options: object) -> object:
         """Both commands identify the same."""

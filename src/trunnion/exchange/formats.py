@@ -65,7 +65,7 @@ FORMATS: dict[str, Format] = {
     ".dxf": Format("DXF", "dxf.read", "drawing.write"),
     ".stl": Format("STL", MESH),
     ".3mf": Format("3MF", MESH),
-    ".glb": Format("glTF", MESH, "mesh.write", moves=True, magnifies=True),
+    ".glb": Format("glTF", MESH, "glb.write", moves=True, magnifies=True),
     ".fcstd": Format("FreeCAD", "freecad.read"),
     ".pmks": PMKS,
     ".url": PMKS,

@@ -264,7 +264,7 @@ class Fit:
         return np.nan_to_num(np.concatenate(rows), nan=0.0, posinf=0.0, neginf=0.0)
 
     def allowed(self, x: Array) -> list[Mask]:
-        """Positions of each block where the model has a sound answer and the data have a value."""
+        """Positions of each block where the model has a sound answer, and model and data have a reading."""
         masks, courses = [], self.courses(x)
         for k, block in enumerate(self.blocks):
             modelled = courses[block.condition]
@@ -277,7 +277,7 @@ class Fit:
                 edges = beside(modelled.turned, guard)
                 edges |= corners(value, u, closed=self.model.run.cycle.periodic, guard=guard)
                 good = (status == Status.SOLVED) & ~edges
-            masks.append(good & np.isfinite(block.signal.mean) & np.isfinite(value))
+            masks.append(good & np.isfinite(self.gap(x, k)))
         return masks
 
     def scatter(self, x: Array | None = None) -> list[float]:

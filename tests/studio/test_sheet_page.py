@@ -377,6 +377,7 @@ def test_two_fingers_shift_and_zoom_the_sheet(user):
     touch = user.page.context.new_cdp_session(user.page)
     touch.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
     where = "((frame) => [frame.scale, ...frame.to([0, 0])])(m.sheet.view.frame)"
+    user.idle()  # the first answer may fit the sheet anew
     scale, *origin = user.of("sheet", where)
     before, box = user.state("s.text.value"), user.page.locator(".sheet").bounding_box()
 

@@ -15,13 +15,13 @@ from mechanisms_parts import Data
 from toleranced import fourbar
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.algebra.plane import Wrench
+from trunnion.algebra.space import Screw
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
-from trunnion.measures import curves
-from trunnion.measures.curves import MOTIONS, value
-from trunnion.measures.measures import Measure
+from trunnion.measures.measures import MOTIONS, Measure, value
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward, pass_on, unloaded
-from trunnion.solve.forward import Forward, forward
+from trunnion.solve.forward import Forward, SpatialWalk, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.gears import gears_of
 from trunnion.solve.run import Run
@@ -123,9 +123,30 @@ def plays(system: System, values: Values) -> dict[str, Play]:
 
 def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
     """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
-    loads = curves.loads(measure, walk)
-    back = under(walk, loads)
+    back = under(walk, unit_loads(measure, walk))
     return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
+
+
+def unit_loads(measure: Measure, walk: Forward) -> dict[str, Any]:
+    """Loads by link, about the global origin, whose power is the rate of a measure of MOTIONS.
+
+    They are equal and opposite on the two links of a joint. Under these alone, the drivers at rest, the reactions say
+    what every small displacement in a joint does to it.
+    """
+    space = isinstance(walk, SpatialWalk)
+    none: Any = (0.0, 0.0, 0.0) if space else 0.0
+    along: Any = measure.along or tuple(float(axis == measure.axis) for axis in ("xyz" if space else "xy"))
+    if measure.kind == "point":
+        link, point = measure.subject.split(".")
+        return {link: walk.algebra.about(along, none, walk.point(link, point).place)}
+    if measure.kind == "angle":
+        return {measure.subject: Screw(none, along) if space else Wrench(0.0, 0.0, 1.0)}
+    links, ends = walk.system.joints[measure.subject][1], walk.ends(measure.subject)
+    axis: Any = ends[1].z if space else (ends[0].c, ends[0].s)
+    load: Any = Screw(none, axis) if space else Wrench(0.0, 0.0, 1.0)
+    if measure.kind == "slide":
+        load = walk.algebra.about(axis, none, walk.algebra.place_of(ends[1]))
+    return {links[0]: walk.algebra.times(-1.0, load), links[1]: load}
 
 
 def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
@@ -152,7 +173,7 @@ def by_duals(run: Run, measure: Measure, known: Mapping[str, Play], time: Array,
     offsets = {path: Dual(0.0, row) for path, row in rows.items()}
     with np.errstate(all="ignore"):
         if measure.kind in MOTIONS:
-            number = curves.value(measure, forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+            number = value(measure, forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
         elif measure.of_motion:
             number = measure.curve(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))[0]
         else:

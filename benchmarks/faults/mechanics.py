@@ -374,14 +374,14 @@ _MEASURES = (
     ),
     Fault(
         "breaks-stay-in-derivatives",
-        "measures/group.py",
+        "measures/many.py",
         "bends = Dual(bends, np.divide(shifts, 2 * step,",
         "bends = Dual(bends, 0.0 * np.divide(shifts, 2 * step,",
         ("tests/reference/test_loads_that_jump.py",),
     ),
     Fault(
         "transmission-angle-not-folded",
-        "measures/curves.py",
+        "measures/measures.py",
         "np.pi / 2 - namespace(angle).abs(angle)",
         "np.pi / 2 - angle",
         ("tests/reference/test_kinematic_measures.py", "-k", "cosines"),

@@ -11,8 +11,7 @@ import trunnion
 from gallery.entry import STEPS, Entry, Outcome, corner, slope
 from gallery.spatial import rocker_of_rssr
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.measures.curves import value
-from trunnion.measures.measures import named
+from trunnion.measures.measures import named, value
 from trunnion.solve.run import prepare
 
 

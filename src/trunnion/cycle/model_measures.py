@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.measures import curves
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.figures import SIGNS
 from trunnion.measures.many import figures_of
-from trunnion.measures.measures import Measure, named
+from trunnion.measures.measures import Measure, named, rate_of_angle
 from trunnion.measures.positions import ends_by_name
 from trunnion.results.attributes import MORE_THAN, Figure
 from trunnion.results.dataset import MemberUnits, Variable, described
@@ -176,6 +175,6 @@ def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: Frict
         if measure.wants_margin:
             row[row >= MARGIN] = np.inf
         if measure.turning(run.system):
-            rate = np.broadcast_to(np.asarray(curves.rate(measure.coordinate(run.system), walk), float), time.shape)
+            rate = np.broadcast_to(np.asarray(rate_of_angle(measure.coordinate(run.system), walk), float), time.shape)
             unwrap_row(row, rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)
     return values

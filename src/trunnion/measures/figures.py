@@ -37,8 +37,7 @@ from trunnion.algebra.panels import (
     weighted,
 )  # fmt: skip
 from trunnion.errors import Status
-from trunnion.measures.curves import near
-from trunnion.measures.measures import Measure
+from trunnion.measures.measures import Measure, near
 from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run
@@ -440,14 +439,22 @@ def direction(moments: Sequence[Sequence[Number]]) -> list[Number]:
     to it, is least, and the straightness as the width from the lowest to the highest of them. The positions count by
     the time they stand for, so that the figure does not depend on how many there are. In space the distance is to the
     line as such, and the figure the diameter of the cylinder about it that holds the path. It has no derivative where
-    the path is as wide as long.
+    the path is as wide as long. In space it is the axis of least inertia of the path, the eigenvector of the largest
+    eigenvalue of its moments.
     """
     if len(moments) == 2:
         twice = 2.0 * moments[0][1], moments[0][0] - moments[1][1]
         xp = namespace(*twice)
         angle = 0.5 * xp.arctan2(*twice)
         return [xp.cos(angle), xp.sin(angle)]
-    return _axis(moments)
+    real = np.stack([np.stack([np.asarray(primal(n)) for n in row], axis=-1) for row in moments], axis=-2)
+    if any(isinstance(n, Dual) for row in moments for n in row):
+        slopes = np.stack([np.stack([np.asarray(derivative(n)) for n in row], axis=-1) for row in moments], axis=-2)
+        vectors: Number = eigh(Dual(*np.broadcast_arrays(real, slopes))).vectors
+    else:  # by rising eigenvalue; NaN where a matrix is
+        sound = np.all(np.isfinite(real), axis=(-2, -1), keepdims=True)
+        vectors = np.where(sound, np.linalg.eigh(np.where(sound, real, np.eye(3))).eigenvectors, np.nan)
+    return [vectors[..., k, -1] for k in range(3)]
 
 
 def turn(axes: Sequence[Number], before: Sequence[Number], axis: str) -> Number:
@@ -474,15 +481,3 @@ def turn(axes: Sequence[Number], before: Sequence[Number], axis: str) -> Number:
     sine = xp.sqrt(xp.where(far, square, 1.0))
     factor = xp.where(far, xp.arctan2(sine, cosine) / sine, series)
     return sines["xyz".index(axis)] * factor
-
-
-def _axis(moments: Sequence[Sequence[Number]]) -> list[Number]:
-    """The axis of least inertia of the path: the eigenvector of the largest eigenvalue of its moments."""
-    real = np.stack([np.stack([np.asarray(primal(n)) for n in row], axis=-1) for row in moments], axis=-2)
-    if any(isinstance(n, Dual) for row in moments for n in row):
-        slopes = np.stack([np.stack([np.asarray(derivative(n)) for n in row], axis=-1) for row in moments], axis=-2)
-        vectors: Number = eigh(Dual(*np.broadcast_arrays(real, slopes))).vectors
-    else:  # by rising eigenvalue; NaN where a matrix is
-        sound = np.all(np.isfinite(real), axis=(-2, -1), keepdims=True)
-        vectors = np.where(sound, np.linalg.eigh(np.where(sound, real, np.eye(3))).eigenvectors, np.nan)
-    return [vectors[..., k, -1] for k in range(3)]

@@ -1,22 +1,27 @@
-"""Measures: numbers that follow from the motion of a mechanism, or from its forces.
+"""Measures: numbers that follow from the motion of a mechanism, or from its forces; SI, angles in (−π, π].
 
-`model.measure_table.MEASURES` is the vocabulary, one entry a kind, `curves.CURVES` the course of each: the one or
-more numbers, position by position, that its figure is made of (`figures`).
+`model.measure_table.MEASURES` is the vocabulary, one entry a kind. `CURVES` has the course of each: the one or more
+numbers, position by position, that its figure is made of (`figures`); a function of a `Backward` if it needs forces,
+else of a `Forward`. Floats, arrays or dual numbers flow through, as the values of the mechanism are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import functools
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.vector import cross, dot
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.curves import AXES, CURVES, MOTIONS, angle_at, near
+from trunnion.groups.dyad import DyadPose
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.expression import Expression
 from trunnion.model.joint_parts import motions
@@ -25,13 +30,25 @@ from trunnion.model.measure_table import Measure as Stated
 from trunnion.model.measure_units import course_kind, operands
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
-from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward
-from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
+from trunnion.solve.backward import Backward, pose_status
+from trunnion.solve.contacts import loads_on_ends
+from trunnion.solve.forward import Forward, SpatialWalk
+from trunnion.solve.friction_method import MARGIN
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work, springs, useful_powers
+from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import System, Values
+from trunnion.solve.turns import near, turned
 
-__all__ = ["Formula", "Measure", "chosen", "coordinate_unit", "named", "outputs"]
+__all__ = [
+    "CURVES", "MOTIONS", "Formula", "Measure", "angle_at", "angles", "chosen", "coordinate_unit", "named", "near",
+    "outputs", "pressure_angles", "rate_of_angle", "value", "within",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+
+AXES = ("x", "y", "z")
+MOTIONS = ("point", "angle", "rotation", "slide")  # kinds of measures of which `value` is the one number
 
 
 @dataclass(frozen=True)
@@ -305,7 +322,19 @@ def _measure(name: str, entry: Stated, values: Values, mechanism: Mechanism) -> 
 
     over, within = numbers("over.from", "over.to"), numbers("within.from", "within.to")
     places = [f"{path}.{key}" for key in ("at", "over.from") if f"{path}.{key}" in values]
-    kinds = mechanism.parameter_kinds()
+    kinds, formula = mechanism.parameter_kinds(), None
+    if entry.formula is not None:  # it needs what the most demanding of its parts does
+        parts, inner = dict[str, Measure](), dict[str, Formula]()
+        for operand, stated in operands(mechanism, entry).items():
+            part = stated and _measure(operand, stated, values, mechanism)
+            if part and part.formula:
+                inner[operand] = part.formula
+                parts |= part.formula.parts
+            elif part:
+                parts[operand] = part
+        needs = max((part.of.needs for part in parts.values()), key=("places", "motion", "forces").index)
+        kind = replace(MEASURES["expression"], quantity=course_kind(mechanism, entry), needs=needs)
+        formula = Formula(entry.formula, parts, inner, kind)
     return Measure(
         name, entry.kind, entry.subject, entry.axis or "",
         number("limit.lower"), number("limit.upper"), number("at_least"), number("at_most"),
@@ -316,27 +345,8 @@ def _measure(name: str, entry: Stated, values: Values, mechanism: Mechanism) -> 
         along=numbers(*(f"along.{axis}" for axis in AXES)),
         within=(within[0], within[1]) if within else None,
         duration=number("duration"),
-        formula=_formula(mechanism, entry, values),
+        formula=formula,
     )  # fmt: skip
-
-
-def _formula(mechanism: Mechanism, entry: Stated, values: Values) -> Formula | None:
-    """The expression of a measure, None of another kind: it needs what the most demanding of its parts does."""
-    if entry.formula is None:
-        return None
-    parts, inner = dict[str, Measure](), dict[str, Formula]()
-    for name, part in operands(mechanism, entry).items():
-        if part is None:
-            continue
-        measure = _measure(name, part, values, mechanism)
-        if measure.formula is None:
-            parts[name] = measure
-        else:
-            inner[name] = measure.formula
-            parts |= measure.formula.parts
-    needs = max((part.of.needs for part in parts.values()), key=("places", "motion", "forces").index)
-    kind = replace(MEASURES["expression"], quantity=course_kind(mechanism, entry), needs=needs)
-    return Formula(entry.formula, parts, inner, kind)
 
 
 def outputs(system: System) -> list[Measure]:
@@ -348,3 +358,273 @@ def outputs(system: System) -> list[Measure]:
         if ground in links and name not in drivers
         for freedom in motions(kind)
     ]
+
+
+# ---- the courses ----------------------------------------------------------------------------------------------
+
+
+def _component(measure: Measure, vector: Any) -> Number:
+    """The component of a vector that is asked for, or its magnitude, which has no derivative where it is 0."""
+    if measure.axis:
+        return vector[AXES.index(measure.axis)]
+    total: Number = 0.0
+    if measure.along:
+        length = sum(part * part for part in measure.along) ** 0.5
+        for share, part in zip(measure.along, vector, strict=True):
+            total = total + share / length * part
+        return total
+    for part in vector:
+        total = total + part * part
+    return namespace(total).sqrt(total)
+
+
+def value(measure: Measure, walk: Forward) -> Number:
+    """The number of a measure of MOTIONS, m or rad.
+
+    The turn of a link in space is that from the real part of its frame, which has a derivative only: ½ Σ eᵢ⁰ × eᵢ along
+    the axis.
+    """
+    if measure.kind == "point":
+        return _component(measure, walk.point(*measure.subject.split(".")).place)
+    if measure.kind != "angle":
+        return walk.coordinates(measure.subject)[("rotation", "slide").index(measure.kind)]
+    frame = walk.motions[measure.subject].frame
+    if not isinstance(walk, SpatialWalk):
+        return namespace(frame.c, frame.s).arctan2(frame.s, frame.c)
+    crosses = [cross(tuple(primal(number) for number in axis), axis) for axis in frame[:3]]
+    return _component(measure, tuple(0.5 * (a + b + c) for a, b, c in zip(*crosses, strict=True)))
+
+
+def _turn_or_slide(of: str) -> Callable[[Measure, Forward], Number]:
+    """Of what a joint has `of` its rotation and of its slide the former, the latter if it does not turn."""
+    return lambda measure, walk: getattr(walk, of)(measure.subject)[0 if walk.system.turns(measure.subject) else 1]
+
+
+def _of_point(of: str) -> Callable[[Measure, Forward], Number]:
+    """A component of the velocity or acceleration of a point."""
+    return lambda measure, walk: _component(measure, getattr(walk.point(*measure.subject.split(".")), of))
+
+
+def _path(measure: Measure, walk: Forward) -> tuple[Number, ...]:
+    """The coordinates of a point."""
+    return tuple(walk.point(*measure.subject.split(".")).place)
+
+
+def _of_link(of: str) -> Callable[[Measure, Forward], Number]:
+    """Angular velocity or acceleration of a link; in the plane counterclockwise."""
+
+    def spin(measure: Measure, walk: Forward) -> Number:
+        twist: Any = getattr(walk.motions[measure.subject], of)
+        return twist.w if hasattr(twist, "w") else _component(measure, twist.u)
+
+    return spin
+
+
+def _of_spring(of: str) -> Callable[[Measure, Forward], Number]:
+    """Force or elongation of a spring."""
+    return lambda measure, walk: next(getattr(state, of) for name, _, state in springs(walk) if name == measure.subject)
+
+
+# ---- how well a dyad passes force on --------------------------------------------------------------------------
+
+
+def _pressure_angle(pose: DyadPose) -> Number:
+    """Pressure angle φ of a dyad from its pose, rad in −π/2 … π/2.
+
+    The angle between the force that the first link puts on the second, had the first neither friction nor loads,
+    and the velocity of the point of the second that it acts on, against the link that holds the second. But for RPP
+    it is the same the other way round. cos φ is 2 over the condition number of the dyad. With its joints B, C, D:
+
+    RRR   force along BC, velocity of C across DC: sin φ = cos(BC, DC), positive where the angle at C is acute
+    RRP   force along BC, velocity along the guide u: sin φ = p/|BC|, C being p to the left of the line along u by B
+    RPR   force across the slide, through B, velocity across BD: sin φ = e/|BD|, D being e to the left of that line
+    PRP, RPP   force across the one guide u, velocity along the other v: sin φ = cos(u, v)
+
+    Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
+    """
+    moves = 1 / pose.area
+    xp = namespace(pose.lost, moves)
+    return xp.arctan2(pose.lost, xp.abs(moves))
+
+
+def _dyads(walk: Forward) -> dict[tuple[str, ...], DyadPose]:
+    """The pose of every dyad by its joints."""
+    modules = zip(walk.system.plan.modules, walk.poses, strict=True)
+    return {tuple(module.joints): pose for module, pose in modules if isinstance(pose, DyadPose)}
+
+
+@np.errstate(all="ignore")
+def pressure_angles(walk: Forward) -> dict[str, Number]:
+    """Pressure angle of every dyad along a walk in the plane, by its joints' names."""
+    return {"-".join(joints): _pressure_angle(pose) for joints, pose in _dyads(walk).items()}
+
+
+@np.errstate(all="ignore")
+def _pressure_at(measure: Measure, walk: Forward) -> Number:
+    """Pressure angle of the dyad that a joint is of; MechanismError if it is of none."""
+    poses = {joint: pose for joints, pose in _dyads(walk).items() for joint in joints}
+    if measure.subject not in poses:
+        what = f"'{measure.subject}' is no joint of a dyad, which alone has a transmission angle"
+        those = f"those of a dyad are {', '.join(poses)}" if poses else "this mechanism has no dyad"
+        raise MechanismError(Finding(what, f"joints.{measure.subject}", those))
+    return _pressure_angle(poses[measure.subject])
+
+
+def _transmission_angle(measure: Measure, walk: Forward) -> Number:
+    """Rad in 0 … π/2: of an RRR the angle at its inner pin, folded to be acute."""
+    angle = _pressure_at(measure, walk)
+    return np.pi / 2 - namespace(angle).abs(angle)
+
+
+# ---- of the forces --------------------------------------------------------------------------------------------
+
+
+def _load(measure: Measure, back: Backward) -> Number:
+    """Torque or force of a load on a joint against the joint's positive sense; NaN where the joint rests.
+
+    Times the speed of the joint it is the power that the load takes.
+    """
+    load = back.walk.system.mechanism.loads[measure.subject]
+    speed = back.walk.rates(load.joint or "")[0 if load.resisting_torque is not None else 1]
+    xp = namespace(speed)
+    return -back.load_powers[measure.subject] / xp.where(primal(speed) != 0, speed, np.nan)
+
+
+def _reaction(measure: Measure, back: Backward) -> Number:
+    """Force in a joint without friction and drive effort."""
+    load: Any = back.reactions[measure.subject]
+    return _component(measure, (load.x, load.y) if hasattr(load, "x") else load.u)
+
+
+def _end_load(measure: Measure, back: Backward) -> Number:
+    """The largest of |F⊥/2 ∓ g| with g = M⊥ × u/L, N: what presses on the ends of a bearing or guide of the length L.
+
+    It is the load that friction with two contacts counts, see `joints.contact_loads`.
+    """
+    joint = measure.subject
+    loads = loads_on_ends(back.walk, joint, back.reactions[joint], back.friction_wrenches[joint])
+    squares = [dot(load, load) for load in loads]
+    largest = functools.reduce(namespace(*squares).maximum, squares)
+    loaded = primal(largest) > 0
+    xp = namespace(largest)
+    return xp.where(loaded, xp.sqrt(xp.where(loaded, largest, 1.0)), 0.0)
+
+
+def _power(measure: Measure, back: Backward) -> Number:
+    """What a driver, or a load, gives the mechanism."""
+    name = measure.subject
+    return back.efforts[name] * back.walk.rate(name) if name in back.efforts else back.load_powers[name]
+
+
+def _friction_energy(measure: Measure, back: Backward) -> tuple[Number, ...]:
+    """Power lost to friction in a joint, W, and how long the first driver takes for its cycle, s."""
+    walk = back.walk
+    driver = next(iter(walk.system.mechanism.drivers), "")
+    duration: Number = walk.system.span(walk.values, driver).duration if driver else 0.0
+    return back.losses[measure.subject], duration
+
+
+def _efficiency(measure: Measure, back: Backward) -> Number | tuple[Number, ...]:
+    """Useful and drive power, W; of an instant their ratio, NaN where nothing is useful or the drivers put no power
+    in."""
+    walk = back.walk
+    useful: Number = 0.0 if has_useful_work(walk.system.mechanism) else np.nan
+    driven: Number = 0.0
+    for power_in in useful_powers(walk, back.load_powers, back.springs):
+        useful = useful - power_in
+    for name in walk.system.mechanism.drivers:
+        driven = driven + back.efforts[name] * walk.rate(name)
+    if measure.subject == "cycle":
+        return useful, driven
+    return useful / namespace(driven).where(driven > 0, driven, np.nan)
+
+
+def _locking_margin(measure: Measure, back: Backward) -> Number:
+    """Multiple of the friction at which a module locks, MARGIN where it does not up to there.
+
+    The search for it has no derivatives: they are NaN where dual numbers ask for some below MARGIN.
+    """
+    margin: Number = np.minimum(multiple_that_locks(back), MARGIN)
+    forces: Number = functools.reduce(operator.add, (*back.friction.values(), *back.efforts.values()), 0.0)
+    return Dual(margin, np.where(margin < MARGIN, np.nan, 0.0)) if isinstance(forces, Dual) else margin
+
+
+CURVES: dict[str, Callable[[Measure, Any], Number | tuple[Number, ...]]] = {
+    "point": value,
+    "path_error": _path,
+    "straightness": _path,
+    # in space the axes of the link's frame, nine numbers
+    "angle": lambda measure, walk: (
+        tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
+        if isinstance(walk, SpatialWalk)
+        else value(measure, walk)
+    ),
+    "rotation": value,
+    "slide": value,
+    **dict.fromkeys(("transmission_error", "stroke", "dead_centre", "time_ratio"), _turn_or_slide("coordinates")),
+    "rate": _turn_or_slide("rates"),
+    "joint_acceleration": _turn_or_slide("second_rates"),
+    "velocity": _of_point("velocity"),
+    "acceleration": _of_point("acceleration"),
+    "angular_velocity": _of_link("twist"),
+    "angular_acceleration": _of_link("acceleration"),
+    "transmission_angle": _transmission_angle,
+    "pressure_angle": _pressure_at,
+    "effort": lambda measure, back: back.efforts[measure.subject],
+    "load": _load,
+    "spring_force": _of_spring("force"),
+    "spring_elongation": _of_spring("elongation"),
+    "reaction": _reaction,
+    "end_load": _end_load,
+    "power": _power,
+    "friction_power": lambda measure, back: back.losses[measure.subject],
+    "friction_energy": _friction_energy,
+    "efficiency": _efficiency,
+    "locking_margin": _locking_margin,
+    # of a motion in time, which is no course over a cycle: see `dynamics.measured`
+    **dict.fromkeys(("starting_time", "steady_speed", "fluctuation", "peak_effort"), lambda measure, walk: np.nan),
+}
+
+
+# ---- angles without jumps: by how many whole turns those of a mechanism, in (−π, π], are off --------------------
+
+
+def within(run: Run, times: Number) -> Number:
+    """Times within the cycle, s, of such as may run over its end."""
+    if not run.cycle.periodic or run.cycle.duration <= 0:
+        return times
+    real = primal(times) % run.cycle.duration
+    return Dual(real, times.dual) if isinstance(times, Dual) else real
+
+
+def rate_of_angle(angle: Measure, walk: Forward) -> Number:
+    """Rate of the angle of a link in the plane, or of the rotation of a joint, rad/s."""
+    if angle.kind == "rotation":
+        return walk.rates(angle.subject)[0]
+    return CURVES["angular_velocity"](angle, walk)
+
+
+def angles(run: Run, turning: Mapping[str, Measure], span: tuple[float, float]) -> dict[str, tuple[Array, Array]]:
+    """Times, s, and angles of the nominal mechanism over a span, by name: integrals of their rates."""
+    if not turning:
+        return {}
+
+    def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+        walk = run.walk(within(run, time))
+        speeds = [np.asarray(primal(rate_of_angle(angle, walk)), float) for angle in turning.values()]
+        return np.array(np.broadcast_arrays(*speeds, time)[:-1]), pose_status(walk, time.shape)
+
+    knots = np.array([bend.time for bend in run.bends if bend.scan < 0])
+
+    def firsts(times: Array) -> list[Number]:
+        walk = run.walk(within(run, times))
+        return [value(angle, walk) for angle in turning.values()]
+
+    return dict(zip(turning, turned(run.cycle, look, firsts, knots, span), strict=True))
+
+
+def angle_at(run: Run, angle: Measure, time: Array) -> Array:
+    """An angle of the nominal mechanism at times of its cycle, s, that goes on from its start."""
+    key = ("angle without jumps", angle.kind, angle.subject)
+    table = run.once(key, lambda: angles(run, {"": angle}, (0.0, run.cycle.duration))[""])
+    return np.asarray(np.interp(time, *table))

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.measures.curves import within
-from trunnion.measures.measures import Measure
+from trunnion.measures.measures import Measure, within
 from trunnion.model.checks.units import in_radians
 from trunnion.model.measure_units import place_kind
 from trunnion.model.mechanism import Mechanism
@@ -24,7 +23,7 @@ from trunnion.solve.system import System, Values
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["PositionPlan", "Window", "ends_by_name", "gain_of", "moved", "path_of", "place_of", "plan", "within"]
+__all__ = ["PositionPlan", "Window", "ends_by_name", "gain_of", "moved", "path_of", "place_of", "plan"]
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from trunnion.cycle.course import Mean, course_of, magnitude
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
-from trunnion.measures.curves import pressure_angles
+from trunnion.measures.measures import pressure_angles
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import Figure

@@ -29,8 +29,7 @@ from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS
-from trunnion.measures.curves import MOTIONS
-from trunnion.measures.measures import Measure, chosen
+from trunnion.measures.measures import MOTIONS, Measure, chosen
 from trunnion.measures.positions import place_of
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.joint_parts import clearance

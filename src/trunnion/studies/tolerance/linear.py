@@ -23,11 +23,10 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import selected
 from trunnion.cycle.cycle_kernel import Engine
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.measures.curves import near, within
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import turn
 from trunnion.measures.many import Many, Read
-from trunnion.measures.measures import Measure, chosen, outputs
+from trunnion.measures.measures import Measure, chosen, near, outputs, within
 from trunnion.measures.positions import PositionPlan, moved, place_of, plan
 from trunnion.model.measure_units import dimension_kinds
 from trunnion.model.mechanism import Mechanism

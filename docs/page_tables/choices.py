@@ -140,16 +140,16 @@ def pairs_table() -> str:
     """Every pair of the model file: where it exists and what it needs."""
     from trunnion.joints.clearance import CLEARANCE_MODELS
     from trunnion.joints.pairs import PAIRS
-    from trunnion.model.joint_parts import Joint, contact_lacks, has_guide, has_pin, motions
+    from trunnion.model.joint_parts import Joint, contact_lacks
 
     where = {("planar", "spatial"): "always", ("spatial",): "in space", (): "no"}
     rows = []
     for name, one in PAIRS.items():
-        part = "pin" if has_pin(name) else "guide" if has_guide(name) else ""
+        part = "pin" if one.turns else "guide" if one.guided else ""
         lacks = contact_lacks(Joint(type=name, links=("first", "second")), spatial=True) if part else ()
         rubs = ", ".join(code(f"{part}.{size}") for size in lacks) if part else "" if not one.count else "not modelled"
-        moves = MOVES.get(name) or " and ".join(motions(name))
-        driven = motions(name)[0] if one.drivable else "no"
+        moves = MOVES.get(name) or " and ".join(one.motions)
+        driven = one.motions[0] if one.drivable else "no"
         plane = "yes" if one.planar else "no"
         play = {("planar", "spatial"): "yes", ("spatial",): "in space", (): "no"}[
             tuple(space for space, models in CLEARANCE_MODELS.items() if name in models)

@@ -14,7 +14,6 @@ from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
 from trunnion.joints.contact_loads import ContactLoad, GuideLoad, PinLoad
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.joint_parts import has_guide, has_pin, motions
 
 loads = st.floats(0, 1e6)
 slips = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-9)
@@ -76,9 +75,9 @@ def test_law_takes_arrays_and_duals(name: str) -> None:
 def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
     """What can be driven, resisted and sprung is what moves about or along one axis; its first motion is driven."""
     pair = PAIRS[name]
-    assert pair.drivable == bool(motions(name))
-    assert motions(name)[:1] == (pair.freedoms[:1] if pair.drivable else ())
-    assert not (has_pin(name) and has_guide(name))
+    assert pair.drivable == bool(pair.motions)
+    assert pair.motions[:1] == (pair.freedoms[:1] if pair.drivable else ())
+    assert not (pair.turns and pair.guided)
 
 
 def load_of(turn: float | None) -> ContactLoad:
@@ -147,7 +146,7 @@ def test_play_of_a_pair(space: str, kind: str) -> None:
     assert [key.split(".")[1] in "xyz" for key in keys] == [True] * len(keys)
     assert set(play.axial) < set(range(len(play.ends)))
     assert (play.size is not None) == ({key.split(".")[0] for key in keys} >= {"1", "2"})
-    assert has_guide(kind) == (play.size is not None and play.size[0] == "guide")
+    assert PAIRS[kind].guided == (play.size is not None and play.size[0] == "guide")
     offsets = [tuple(0.1 * i + k for k in range(len(end))) for i, end in enumerate(play.ends)]
     paths = play.paths("seats.A", offsets)
     assert list(paths) == [f"seats.A.{key}" for key in keys]

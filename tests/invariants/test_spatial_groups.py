@@ -16,11 +16,11 @@ from trunnion.algebra.space import Frame, Screw, compose, element, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, Element, GroupJoint, Pose
-from trunnion.joints import pair_motion
+from trunnion.joints import pairs
 
 Array = NDArray[np.float64]
 LANES = 400
-MOTIONS = pair_motion.MOTIONS["spatial"]
+MOTIONS = pairs.MOTIONS["spatial"]
 LEAD = 0.013
 
 

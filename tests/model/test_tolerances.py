@@ -13,10 +13,9 @@ from pydantic_core import PydanticCustomError
 
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import MechanismError
-from trunnion.model.limits import Limits
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import rewrite_mechanism
-from trunnion.model.tolerance_parts import COST_MODELS, DISTRIBUTIONS, OPTIONS, Variation
+from trunnion.model.tolerance_parts import COST_MODELS, DISTRIBUTIONS, OPTIONS, Limits, Variation
 from trunnion.model.tolerances import FORMULA, Price, Tolerance
 from trunnion.statistics import distributions
 

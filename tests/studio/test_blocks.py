@@ -11,7 +11,7 @@ import pytest
 import trunnion
 from studio.asking import EXAMPLES, analysed, ask, edited, model_of, near, sound, unpacked
 from trunnion.model.file import entries_of, text_of
-from trunnion.results.scales import without_noise
+from trunnion.results.attributes import without_noise
 from trunnion.studio.answers import answer
 
 WATT = EXAMPLES["watt-six-bar"]

@@ -11,7 +11,7 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism
-from trunnion.model.screen import shown_as
+from trunnion.model.units import shown_as
 from trunnion.results.attributes import units_of
 from trunnion.results.quantities import between, common, drawn_in, number, parts, prefixed, quantity, read_in, readable
 

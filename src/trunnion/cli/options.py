@@ -77,9 +77,9 @@ class Model:
         So a number that is set stands against what is said of all joints, and may be one that only the other law has.
         swept: a value of each number that the verb replaces, which may be such a one too.
         """
-        from trunnion.model.checks.units import bare_number
+        from trunnion.model.checks.check import bare_number
         from trunnion.model.mechanism import read_mechanism
-        from trunnion.model.screen import follow, stated_units
+        from trunnion.model.units import follow, stated_units
 
         mechanism = read_mechanism(self.file, dict(named_file(text) for text in self.table or ()))
         values = dict(setting(text) for text in self.set_ or ())

@@ -36,10 +36,9 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, summary_of
+from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, scales_in, summary_of
 from trunnion.results.dataset import Result
 from trunnion.results.quantities import readable
-from trunnion.results.scales import scales_in
 from trunnion.solve.run import prepare
 
 __all__ = ["Repeated", "UnsteadyError", "steady"]

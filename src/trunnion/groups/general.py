@@ -19,7 +19,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import Frame, Twist, Wrench, about, place_of, velocity_at
 from trunnion.groups.gear import NUMBERS, GearPair, actions, slide_of, turn_from
 from trunnion.groups.tree import Coordinates, Element, Pose, Tree
-from trunnion.joints.pair_motion import MOTIONS, PairMotion
+from trunnion.joints.pairs import MOTIONS, PairMotion
 
 __all__ = ["General"]
 

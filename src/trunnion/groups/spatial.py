@@ -21,7 +21,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import NULL, Screw, about, moment_at, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
-from trunnion.joints.pair_motion import MOTIONS, PairMotion
+from trunnion.joints.pairs import MOTIONS, PairMotion
 
 __all__ = ["SpatialGroup", "unspun"]
 

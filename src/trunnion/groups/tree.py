@@ -31,8 +31,7 @@ from trunnion.algebra.nested import each, flat, replaced
 from trunnion.groups import redundant
 from trunnion.groups.gear import NUMBERS
 from trunnion.groups.redundant import Support
-from trunnion.joints.pair_motion import PairMotion
-from trunnion.joints.pairs import PAIRS, Pair
+from trunnion.joints.pairs import PAIRS, Pair, PairMotion
 
 __all__ = ["CLOSED", "OUTER", "Coordinates", "Element", "GroupJoint", "Pose", "Step", "Tree"]
 

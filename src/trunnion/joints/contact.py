@@ -22,7 +22,8 @@ import numpy as np
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
-    "CONTACT_LAWS", "ContactLaw", "elastic_force", "hertz_stiffness", "loss_factor", "normal_force", "restitution_of",
+    "CONTACT_LAWS", "ContactLaw", "elastic_force", "hertz_stiffness", "loss_factor", "normal_force",
+    "restitution_of",
 ]  # fmt: skip
 
 HALVINGS = 200

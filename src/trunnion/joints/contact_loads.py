@@ -29,7 +29,7 @@ from trunnion.algebra.nested import each
 from trunnion.algebra.space import Frame
 from trunnion.algebra.vector import Vector3, cross, dot, minus
 
-__all__ = ["BearingLoad", "ContactLoad", "GuideLoad", "PinLoad", "Reaction", "halves"]
+__all__ = ["BearingLoad", "ContactLoad", "GuideLoad", "PinLoad", "Reaction"]
 
 Reaction = tuple[Number, ...]
 

@@ -15,21 +15,9 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
-    "FRICTION_LAWS",
-    "FrictionLaw",
-    "LawParameter",
-    "brown_mcphee",
-    "coulomb",
-    "dahl",
-    "directed",
-    "lugre",
-    "rolling",
-    "rolling_bearing",
-    "stiction",
-    "stiction_at_rest",
-    "stribeck",
-    "viscous",
-]
+    "FRICTION_LAWS", "FrictionLaw", "LawParameter", "coulomb", "dahl", "directed", "lugre", "rolling", "stiction",
+    "stribeck", "viscous",
+]  # fmt: skip
 
 GONE = -700.0  # of which e^x leaves nothing of a coefficient, and which machine code still takes
 
@@ -245,12 +233,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
     ),
     "stribeck": FrictionLaw(
         stribeck,
-        {
-            "coefficient": _COEFFICIENT,
-            "static": _STATIC,
-            "stribeck_speed": _STRIBECK_SPEED,
-            "viscous": _VISCOUS,
-        },
+        {"coefficient": _COEFFICIENT, "static": _STATIC, "stribeck_speed": _STRIBECK_SPEED, "viscous": _VISCOUS},
         source="B. Armstrong-Hélouvry et al., Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7",
         validity="boundary to mixed lubrication in steady sliding; no memory",
     ),

@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.spline import look_up
 
-__all__ = [
-    "MOTORS", "MotorKind", "constant", "control_error", "induction", "linear", "speed_control", "table",
-    "transmitted",
-]  # fmt: skip
+__all__ = ["MOTORS", "MotorKind", "constant", "linear", "table", "transmitted"]
 
 Array = NDArray[np.float64]
 # What a motor states, by key, SI; of `points` lists.

@@ -22,9 +22,9 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.dyad import DyadPose
-from trunnion.model.checks.measures import check_measure
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.checks.tolerances import check_measure
 from trunnion.model.expression import Expression
-from trunnion.model.joint_parts import motions
 from trunnion.model.measure_table import MEASURES, STATISTICS, MeasureKind
 from trunnion.model.measure_table import Measure as Stated
 from trunnion.model.measure_units import course_kind, operands
@@ -356,7 +356,7 @@ def outputs(system: System) -> list[Measure]:
         Measure(f"{freedom}:{name}", freedom, name)
         for name, (kind, links) in system.joints.items()
         if ground in links and name not in drivers
-        for freedom in motions(kind)
+        for freedom in PAIRS[kind].motions
     ]
 
 

@@ -13,7 +13,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import Measure, within
-from trunnion.model.checks.units import in_radians
+from trunnion.model.checks.check import in_radians
 from trunnion.model.measure_units import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity

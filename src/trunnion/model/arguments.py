@@ -15,7 +15,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
-from trunnion.model.screen import shown_as, stated_by
+from trunnion.model.units import shown_as, stated_by
 
 __all__ = ["check_keywords", "held", "strict_arguments"]
 

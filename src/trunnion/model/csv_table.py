@@ -3,30 +3,34 @@
 A model may name a file in its own folder only, whatever links say, see `in_folder`.
 
 Two columns, first time or drive coordinate, then value. With semicolon or tab between them a number may have a decimal
-comma. A first row of texts is a header with units, see `csv_text`; numbers without a unit are SI. Of a file with more
-columns a model names two by their headers, see `_named_columns`.
+comma. A first row of texts is a header with units; numbers without a unit are SI. Of a file with more columns a model
+names two by their headers, see `_named_columns`.
+
+The separator of any CSV file is the first of semicolon, tab and comma that a header has. A unit stands in brackets
+behind the name, `T1 [V]`; one that is in use also as `T1 (V)`, `T1 / V` and `T1 in V`; or in a row of its own below the
+names. Lines that begin with # are passed over.
 """
 
 from __future__ import annotations
 
+import csv
 import io
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PureWindowsPath
 from typing import Any, NamedTuple
 
 from trunnion.errors import Finding, MechanismError, counted
 from trunnion.files import reading
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.csv_text import cells_of, heading, numbered, separator_of, units_below
 from trunnion.model.expression import literal
-from trunnion.model.names import nearest
+from trunnion.model.names import nearest, unguarded
 from trunnion.model.units import ANY, KINDS, NUMBER, Kind, UnitError, dimension_text, unit
 
 __all__ = [
-    "MOST_FILES", "TableFiles", "TablePoints", "column", "in_folder", "place_findings", "read_text", "stated_files",
-    "with_points",
+    "MOST_FILES", "NOTHING", "TIME", "TableFiles", "bare", "cells_of", "column", "heading", "number", "numbered",
+    "place_findings", "read_text", "separator_of", "stated_files", "units_below", "with_points",
 ]  # fmt: skip
 
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
@@ -358,3 +362,82 @@ def in_folder(folder: Path, name: str, where: str) -> Path:
         except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a folder that may not be entered
             what = f"cannot be reached: {getattr(error, 'strerror', None) or error}"
     raise MechanismError(Finding(f"'{name[:60]}' {what}", where, remedy))
+
+
+# ---- the lines of any CSV file: which count, what separates their cells, headings with units --------------------
+
+NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
+TIME = re.compile(r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]\s*)?\d{1,2}:[0-5]\d:[0-5]\d.*", re.ASCII)
+_NO_UNIT = ("", "-", "–", "1")
+_HEADING = re.compile(
+    r"(?P<name>.*?)\s*\[(?P<sure>[^\[\]]*)\]|(?P<before>.*?\S)\s*(?:\((?P<round>[^()]+)\)|(?:\s/|\sin)\s+(?P<last>\S.*))",
+    re.DOTALL,
+)
+
+
+def numbered(lines: Iterable[str]) -> list[tuple[int, str]]:
+    """The lines that are neither empty nor comments, by their numbers from 1."""
+    return [
+        (number, line.rstrip("\n"))
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+
+
+def separator_of(line: str, usual: str = ",") -> str:
+    """What separates the cells of a line; usual: where it has neither semicolon nor tab."""
+    outside = re.sub(r'"[^"]*"', "", line)
+    return next((sign for sign in ";\t" if sign in outside), usual)
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """The cells of a line, without blanks about them."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+    except (csv.Error, StopIteration):
+        return [line]
+
+
+def number(text: object) -> float:
+    """The number of a cell; NaN if it is none."""
+    try:
+        return float(text)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return float("nan")
+
+
+def bare(cell: str) -> str:
+    """A unit without brackets; empty where it says that there is none."""
+    text = cell.strip("[]() ")
+    return "" if text in _NO_UNIT else text
+
+
+def heading(cell: str, unit_of: Callable[[str], object], names: Collection[str] = ()) -> tuple[str, str]:
+    """Name and unit of a header's cell. One of the names with a unit in it stays whole.
+
+    unit_of: raises UnitError of what is no unit that is in use.
+    """
+    cell = unguarded(cell.strip().strip('"').strip())
+    match = _HEADING.fullmatch(cell)
+    if match is None:
+        return cell, ""
+    unit = match["sure"] if match["sure"] is not None else match["round"] or match["last"]
+    if match["sure"] is None:
+        try:
+            unit_of(unit.strip())
+        except UnitError:
+            return cell, ""
+    return cell if cell in names else match["name"] or match["before"] or "", bare(unit)
+
+
+def units_below(units: Sequence[str], cells: Sequence[str]) -> list[str] | None:
+    """The units of headings, of those without one from the row below; None if that is no row of units.
+
+    It is one if it has no number and no time, and at least one unit or more words than one.
+    """
+    texts = [text for cell in cells if (text := cell.strip("[]() ")) and text != "1"]
+    if any((value := number(text.replace(",", "."))) == value or TIME.fullmatch(text) for text in texts):
+        return None
+    if not any(re.search(r"[^\W\d_]|[°%‰]", text) and text.casefold() not in NOTHING for text in texts):
+        return None
+    return [unit or text for unit, text in zip(units, [*map(bare, cells), *[""] * len(units)], strict=False)]

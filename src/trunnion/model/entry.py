@@ -27,7 +27,8 @@ from trunnion.model.quantity import Dimensionless, Length
 from trunnion.model.rules import Directed
 
 __all__ = [
-    "FORMS", "Direction", "Name", "OneOf", "Part", "Position", "ReadOnlyDict", "ShortForm", "forms", "problem", "shape",
+    "FORMS", "Direction", "Name", "OneOf", "Part", "Position", "ReadOnlyDict", "ShortForm", "forms", "problem",
+    "shape",
 ]  # fmt: skip
 
 

@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from trunnion.model.entry import Name, Part, ReadOnlyDict
-from trunnion.model.joint_parts import Joint, JointDefaults, LoopJoint, freedoms, motions
+from trunnion.model.joint_parts import FitChoice, Joint, JointDefaults, LoopJoint, merge_joint
 from trunnion.model.measure_table import Measure
-from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.parts import Driver, Gear, Hint, Link, Load, Spring, Table
 from trunnion.model.quantity import Acceleration, AnyQuantity, nominal_dimensions
 from trunnion.model.rules import InSpace, Refers
@@ -113,7 +112,7 @@ class Fields(Part):
             case "point":
                 return [f"{link}.{point}" for link, points in self.points.items() for point in points]
             case "joint":
-                return [name for name, joint in joints.items() if motions(joint.type)]
+                return [name for name, joint in joints.items() if joint.pair.motions]
             case "free driver":
                 return [name for name, driver in drivers.items() if driver.found]
             case "load on a joint":
@@ -126,7 +125,7 @@ class Fields(Part):
     def coupled(self, gear: str) -> tuple[str, str]:
         """The joints of a gear pair, of a rack or screw that which turns first."""
         first, second = self.gears[gear].joints
-        slides = self.gears[gear].slides and "rotation" not in freedoms(self.effective_joints[first].type)
+        slides = self.gears[gear].slides and not self.effective_joints[first].pair.turns
         return (second, first) if slides else (first, second)
 
     def carriers(self, gear: str) -> tuple[int, int] | None:

@@ -1,29 +1,24 @@
-"""The joints of a model file: what a pair is made of, how it sits, what is wrong with it."""
+"""The joints of a model file: what a pair is made of and how it sits; with defaults merged in and fits as radii."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    ConfigDict,
-    GetJsonSchemaHandler,
-    PlainSerializer,
-    PlainValidator,
-    Tag,
-    WithJsonSchema,
-)
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, PlainSerializer, PlainValidator, Tag, WithJsonSchema
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from trunnion.algebra.namespace import Number
+from trunnion.errors import MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.contact import CONTACT_LAWS, ContactLaw
+from trunnion.joints.fits import fit
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PAIRS
+from trunnion.joints.pairs import PAIRS, Pair
 from trunnion.model.entry import Direction, Name, OneOf, Part, ReadOnlyDict, ShortForm, forms, problem
 from trunnion.model.expression import DIAMETER
 from trunnion.model.quantity import (
@@ -42,21 +37,15 @@ from trunnion.model.rules import NotNegative, NotWith, NotZero, OnlyWith, Positi
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
-    "FRICTION_MODELS", "JOINT_TYPES", "PLAY_PAIRS", "TURNING_PAIRS", "BearingStiffness", "Contact", "Fit", "Friction",
-    "Guide", "Joint", "JointDefaults", "LoopJoint", "Losses", "Misalignment", "Pin", "Seat", "clearance",
-    "contact_lacks", "freedoms", "has_guide", "has_pin", "has_play", "motions", "play",
+    "DEFAULT_LAW", "PLAY_PAIRS", "TURNING_PAIRS", "Contact", "FitChoice", "Friction", "Guide", "Joint",
+    "JointDefaults", "LoopJoint", "Losses", "Misalignment", "Pin", "Seat", "clearance", "contact_lacks", "has_play",
+    "merge_joint", "play", "stated",
 ]  # fmt: skip
 
 JOINT_TYPES = tuple(PAIRS)
 FRICTION_MODELS = ("two-contact", "pezzuti")
 
 
-def freedoms(joint_type: str) -> tuple[str, ...]:
-    """The motions a joint of this type frees, of ("rotation", "slide"): a rotation has a pin, a slide alone a guide."""
-    return PAIRS[joint_type].freedoms
-
-
-JointType = Annotated[str, OneOf(JOINT_TYPES, "joint type")]
 Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
@@ -136,7 +125,6 @@ class Guide(Part):
     clearance: Annotated[Length | None, NotNegative] = None
 
 
-LAW = Selects("contact law", CONTACT_LAWS)
 MATERIAL = OnlyWith("modulus")
 
 
@@ -148,7 +136,7 @@ class Contact(Part):
     the pin if not stated); exponent: n. With law: rigid the restitution alone.
     """
 
-    law: Annotated[str, OneOf(CONTACT_LAWS, "contact law"), LAW] = "restitution"
+    law: Annotated[str, OneOf(CONTACT_LAWS, "contact law"), Selects("contact law", CONTACT_LAWS)] = "restitution"
     restitution: Annotated[Dimensionless | None, Within(0, 1)] = None
     stiffness: Annotated[AnyQuantity | None, Positive, NotWith("modulus")] = None
     exponent: Annotated[Dimensionless | None, Within(1, 10)] = None
@@ -276,7 +264,18 @@ class JointDefaults(Part):
     seat: SeatChoice | None = None
 
 
-class Joint(Part):
+class _Typed(Part):
+    """What has a kind of pair."""
+
+    type: Annotated[str, OneOf(PAIRS, "joint type")]
+
+    @property
+    def pair(self) -> Pair:
+        """The pair of its type."""
+        return PAIRS[self.type]
+
+
+class Joint(_Typed):
     """A kinematic pair between two links, at the point of its own name on both.
 
     contact: its pin is in play as it moves in time, and touches its hole; all other analyses leave it out.
@@ -284,7 +283,6 @@ class Joint(Part):
     keeps its place while the joint turns, where its play is that of an analysis of tolerances; either if not stated.
     """
 
-    type: JointType
     links: Annotated[tuple[str, str], Refers("link", distinct=True)]
     pitch: Pitch | None = None
     pin: Pin | None = None
@@ -298,11 +296,10 @@ class Joint(Part):
     seat_on: Name | None = None
 
 
-class LoopJoint(Part):
+class LoopJoint(_Typed):
     """A row of a dual Denavit–Hartenberg table: the joint, then the link after it up to the next joint."""
 
     joint: Name
-    type: JointType
     link: Name
     twist: Angle = Quantity(0, KINDS["angle"])
     distance: Length = Quantity(0, KINDS["length"])
@@ -324,28 +321,13 @@ PLAY_PAIRS = tuple(_PLAYS)  # those whose play is modelled
 TURNING_PAIRS = tuple(kind for kind, model in _PLAYS.items() if model.turns)  # of these those in which nothing slides
 
 
-def motions(joint_type: str) -> tuple[str, ...]:
-    """Which of rotation and slide a joint of this type makes about and along the one axis that both links share."""
-    return PAIRS[joint_type].motions
-
-
-def has_pin(joint_type: str) -> bool:
-    """Whether a joint of this type has a pin (or ball) in a hole."""
-    return PAIRS[joint_type].turns
-
-
-def has_guide(joint_type: str) -> bool:
-    """Whether a joint of this type has a slider in a guide."""
-    return PAIRS[joint_type].guided
-
-
 def contact_lacks(joint: Joint, spatial: bool) -> tuple[str, ...]:
     """Sizes of pin or guide that friction in this joint needs and that are not stated, such as ("radius",)."""
-    if has_guide(joint.type):
+    if joint.pair.guided:
         return () if joint.guide and joint.guide.length else ("length",)
     rolls = joint.friction is not None and joint.friction.law == "rolling"
     radius = () if rolls or (joint.pin and joint.pin.radius) else ("radius",)
-    if not spatial or PAIRS[joint.type].ball:
+    if not spatial or joint.pair.ball:
         return radius
     return radius if joint.pin and (joint.pin.bearing or joint.pin.length) else (*radius, "bearing")
 
@@ -355,7 +337,7 @@ def has_play(joint: Joint) -> bool:
     pin, guide = joint.pin, joint.guide
     if joint.type not in PLAY_PAIRS:
         return False
-    if has_guide(joint.type):
+    if joint.pair.guided:
         return guide is not None and guide.clearance is not None
     return pin is not None and (
         pin.clearance is not None or pin.end_float is not None or bool(pin.radius and pin.hole_radius)
@@ -384,8 +366,117 @@ def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
     """
     if not has_play(joint):
         return 0.0
-    if has_guide(joint.type):
+    if joint.pair.guided:
         return values[f"joints.{name}.guide.clearance"]
     pin, gap = f"joints.{name}.pin", clearance(name, values)
     across = 0.0 if gap is None else gap + values.get(f"{pin}.cylindricity", 0.0)
     return across if across != 0 else 0.5 * values.get(f"{pin}.end_float", 0.0)
+
+
+# ---- a joint with the defaults of its model merged in, its fit as radii ----------------------------------------
+
+DEFAULT_LAW = "coulomb"
+NO_FRICTION = Quantity(0)
+RADII = {"radius", "hole_radius", "clearance"}  # what a fit states
+FitChoice = Literal["minimum", "mean", "maximum"]
+
+
+def merge_joint(
+    joint: Joint, defaults: JointDefaults, spatial: bool, limits: FitChoice, dimensions: Mapping[str, Number]
+) -> Joint:
+    """A joint with the defaults that apply to its type, its friction complete: law, model and every parameter.
+
+    limits: which limits of a fit are nominal; dimensions: nominal values of the dimensions that its size may speak of.
+    """
+    pin, guide = joint.pin, joint.guide
+    if joint.pair.turns and (pin or defaults.pin):
+        floats = joint.pair.pivot
+        default = {key: size for key, size in stated(defaults.pin).items() if key != "end_float" or floats}
+        pin = Pin(**_pin(default, stated(pin), limits, dimensions))
+    if joint.pair.guided and (guide or defaults.guide):
+        guide = Guide(**{**stated(defaults.guide), **stated(guide)})
+    rubs = joint.pair.count > 0  # nothing slips in a fixed joint: it needs no exception from the defaults
+    friction = _friction(stated(defaults.friction) if rubs else {}, stated(joint.friction))
+    touching = joint.contact and joint.contact.complete()
+    merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction, "contact": touching})
+    bored = joint.pair.bored  # its numbers can be set; what another joint states is for a finding
+    misalignment = (joint.misalignment or Misalignment()).complete(spatial) if bored else joint.misalignment
+    merged = merged.model_copy(update={"misalignment": misalignment, "seat": _seat(merged, defaults.seat)})
+    stated_of_law = friction.parameters if friction else {}
+    if stated_of_law.get("coefficient") == NO_FRICTION and stated_of_law.get("backward") in (None, NO_FRICTION):
+        touches = joint.pair.turns or joint.pair.guided
+        if not touches or contact_lacks(merged, spatial):
+            return merged.model_copy(update={"friction": None})  # friction: 0 asks for no radius or length
+    return merged
+
+
+def stated(part: BaseModel | None) -> Mapping[str, Any]:
+    """What was written of a part: its own values by key."""
+    return {} if part is None else {key: getattr(part, key) for key in sorted(part.model_fields_set)}
+
+
+def _pin(
+    default: Mapping[str, Any], own_pin: Mapping[str, Any], limits: FitChoice, dimensions: Mapping[str, Number]
+) -> dict[str, Any]:
+    """A pin's own values over the defaults; one way to state the play replaces the others."""
+    instead = {"fit": RADII, "radius": {"fit"}}
+    instead |= {"clearance": {"fit", "hole_radius"}, "hole_radius": {"fit", "clearance"}}
+    replaced = {other for key in own_pin for other in instead.get(key, ())}
+    merged = {**{key: size for key, size in default.items() if key not in replaced}, **own_pin}
+    if merged.get("fit"):
+        for key, radius in _radii(merged["fit"], limits, dimensions).items():
+            merged[key] = merged.get(key) or radius
+    return merged
+
+
+def _radii(stated_fit: Fit, limits: FitChoice, dimensions: Mapping[str, Number]) -> dict[str, Quantity]:
+    """Radii of pin and hole of a fit with their tolerances; half the size for the pin alone where it has no limits."""
+    size = stated_fit.size
+    try:
+        fit_limits = fit(float(size.evaluate(dimensions)), stated_fit.hole, stated_fit.shaft)
+    except (MechanismError, KeyError):  # a finding of its own
+        return {"radius": _half(size, 0.0, None)}
+    radii = {}
+    # the smallest play is that of the largest pin in the smallest hole
+    for key, (low, high), end in (
+        ("radius", fit_limits.shaft_limits, {"minimum": 1.0, "mean": 0.5, "maximum": 0.0}),
+        ("hole_radius", fit_limits.hole_limits, {"minimum": 0.0, "mean": 0.5, "maximum": 1.0}),
+    ):
+        share = end[limits]
+        nominal, width = (low + share * (high - low)) / 2, (high - low) / 2
+        radii[key] = _half(size, round(nominal, 12), (round(-share * width, 12), round((1 - share) * width, 12)))
+    return radii
+
+
+def _half(size: Quantity, deviation: float, tolerance: tuple[float, float] | None) -> Quantity:
+    """Half a diameter and a deviation (m) of the radius."""
+    text = f"({size.source}) / 2" + f" {'-' if deviation < 0 else '+'} {abs(deviation):.12g} m" * (deviation != 0)
+    return replace(Quantity.read(text, size.kind), tolerance=tolerance)
+
+
+def _seat(joint: Joint, default: SeatChoice | None) -> SeatChoice:
+    """A joint's own seat; else the default where it has a play that this can mean; else free."""
+    seat = joint.seat
+    suits = default is not None and has_play(joint)
+    if isinstance(default, Seat):
+        suits = suits and (default.direction is not None) == joint.pair.ball
+    if seat is None:
+        seat = default if suits else "free"
+    elif isinstance(seat, Seat) and isinstance(default, Seat) and suits:
+        seat = Seat(**{**stated(default), **stated(seat)})
+    return seat.complete() if isinstance(seat, Seat) else seat or "free"
+
+
+def _friction(default: Mapping[str, Any], own_friction: Mapping[str, Any]) -> Friction | None:
+    """Friction complete: the joint's own over the file's defaults (those its law knows) over the law's."""
+    if not default and not own_friction:
+        return None
+    law = own_friction.get("law") or default.get("law") or DEFAULT_LAW
+    declared = FRICTION_LAWS[law].parameters
+    if (default.get("law") or DEFAULT_LAW) != law:
+        default = {key: value for key, value in default.items() if key in (*declared, "model")}
+    if "coefficient" in own_friction:  # of both directions, unless it says otherwise
+        default = {key: value for key, value in default.items() if key != "backward"}
+    filled = {key: parameter.default for key, parameter in declared.items() if parameter.default is not None}
+    model = own_friction.get("model") or default.get("model") or "two-contact"
+    return Friction.model_validate({**filled, **default, **own_friction, "law": law, "model": model})

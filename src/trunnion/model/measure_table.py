@@ -12,12 +12,12 @@ from pydantic import Field, create_model, model_validator
 
 from trunnion.model.entry import Direction, Part
 from trunnion.model.expression import Expression, parse
-from trunnion.model.limits import LimitText
 from trunnion.model.quantity import AnyQuantity
 from trunnion.model.rules import InSpace, NotWith, Positive
+from trunnion.model.tolerance_parts import LimitText
 from trunnion.model.units import KINDS, Kind, UnitError
 
-__all__ = ["MEASURES", "STATISTICS", "Measure", "MeasureKind", "Statistic"]
+__all__ = ["MEASURES", "STATISTICS", "Measure", "MeasureKind"]
 
 
 @dataclass(frozen=True)

@@ -9,17 +9,13 @@ from contextlib import suppress
 from trunnion.errors import Finding
 from trunnion.model.expression import parse
 from trunnion.model.fields import Fields
-from trunnion.model.joint_parts import freedoms
 from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import faults
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
-__all__ = [
-    "course_kind", "dimension_kinds", "drive_kind", "expression_findings", "operands",
-    "place_kind",
-]  # fmt: skip
+__all__ = ["course_kind", "dimension_kinds", "drive_kind", "expression_findings", "operands", "place_kind"]
 
 _COLUMN = re.compile(r"(?P<part>\w+)\.(?P<kind>rotation|slide|effort)|(?P<point>\w+\.\w+)\.(?P<axis>[xyz])")
 
@@ -43,7 +39,7 @@ def _of_dimension(dimension: Dimension | None) -> Kind:
 def drive_kind(mechanism: Fields) -> Kind:
     """What the coordinate of the first driver measures."""
     joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
-    return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
+    return KINDS["length" if joint and not joint.pair.turns else "angle"]
 
 
 def course_kind(mechanism: Fields, measure: Measure) -> Kind:
@@ -71,7 +67,7 @@ def slides(mechanism: Fields, measure: Measure) -> bool:
         if name is None:  # between two points
             return True
     joint = mechanism.effective_joints.get(name or "")
-    return joint is not None and "rotation" not in freedoms(joint.type)
+    return joint is not None and not joint.pair.turns
 
 
 def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:

@@ -22,20 +22,16 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.fields import Fields
-from trunnion.model.joint_parts import Contact, Friction, Joint, Losses, freedoms
-from trunnion.model.limits import Limits
+from trunnion.model.joint_parts import DEFAULT_LAW, Contact, Friction, Joint, Losses
 from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, place_kind
-from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import AT, Driver, Gear, Point
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
-from trunnion.model.tolerance_parts import Variation
+from trunnion.model.tolerance_parts import Limits, Variation
 from trunnion.model.units import ANY, KINDS, Kind, unit
 
-__all__ = [
-    "LIMITS", "Entry", "Numbers", "ParameterSet", "dimension_errors", "entries", "measured", "walk",
-]  # fmt: skip
+__all__ = ["LIMITS", "Entry", "Numbers", "ParameterSet", "dimension_errors", "entries", "measured", "walk"]
 
 Location = tuple[str | int, ...]
 Rules = tuple[Any, ...]  # of model.rules
@@ -142,7 +138,7 @@ def _turns(mechanism: Fields, section: str, name: str, part: Any) -> bool | None
         return False
     joint = part.joint if section == "springs" else part.moves if section == "drivers" and part.moves else name
     stated = mechanism.effective_joints.get(joint)
-    return None if stated is None else "rotation" in freedoms(stated.type)
+    return None if stated is None else stated.pair.turns
 
 
 def _kind_in_place(mechanism: Fields, section: str, part: Any, turns: bool | None, entry: Entry) -> Kind:
@@ -229,7 +225,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
-                entry = replace(entry, kind=entry.kind.of("rotation" in freedoms(joint.type)))
+                entry = replace(entry, kind=entry.kind.of(joint.pair.turns))
             elif isinstance(part, Contact) and entry.location[-1] == "stiffness":  # K of F = K dⁿ
                 kind = ANY  # where the exponent depends on dimensions
                 if part.exponent is not None and not part.exponent.names:

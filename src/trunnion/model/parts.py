@@ -11,12 +11,7 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import (
-    Discriminator,
-    Field,
-    PrivateAttr,
-    Tag,
-)
+from pydantic import Discriminator, Field, PrivateAttr, Tag
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.joints.motors import MOTORS, MotorKind
@@ -178,11 +173,7 @@ class Driver(Part):
     """
 
     law: Annotated[str, OneOf(MOTION_LAWS, "motion law"), _LAW] = "constant"
-    moves: Annotated[
-        str | None,
-        Refers("joint"),
-        OnlyWith("prescribed", "a motion that is prescribed"),
-    ] = None
+    moves: Annotated[str | None, Refers("joint"), OnlyWith("prescribed", "a motion that is prescribed")] = None
     speed: Annotated[Rate | None, NotZero("the driver does not move")] = None
     start: AngleOrLength | None = None
     range: tuple[AngleOrLength, AngleOrLength] | None = None

@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.fits import standard_tolerance
-from trunnion.model.changes import assign, stated_at
 from trunnion.model.csv_table import column
-from trunnion.model.limits import DIGITS, half_width, limits_text, written
 from trunnion.model.parameters import Entry, Numbers, measured, walk
+from trunnion.model.places import assign, stated_at
 from trunnion.model.quantity import Quantity
-from trunnion.model.tolerance_parts import DISTRIBUTIONS, Cost, Variation
+from trunnion.model.tolerance_parts import DIGITS, DISTRIBUTIONS, Cost, Variation, half_width, limits_text, written
 from trunnion.model.units import ANY, KINDS, UnitError, unit
 
 __all__ = ["Price", "ProcessChoice", "Tolerance", "Varying", "ends_motion", "may_vary", "towards"]

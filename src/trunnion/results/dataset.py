@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trunnion.results.attributes import encoded
+from trunnion.results.attributes import encoded, scales_in
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "TIME", "UNITS_OF_EACH", "Column", "MemberUnits", "Result", "Variable", "dataset_of", "described", "driven", "flat",
-    "unit_of", "units_along", "with_variables",
+    "UNITS_OF_EACH", "Column", "MemberUnits", "Result", "Variable", "dataset_of", "described", "driven", "flat",
+    "unit_of", "units_along", "with_variables", "without_noise",
 ]  # fmt: skip
 
 
@@ -203,6 +203,27 @@ def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> 
 def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> list[str]:
     units = (variable.attrs.get(UNITS_OF_EACH) for variable in variables.values())
     return list(dict.fromkeys(name for name in units if name is not None))
+
+
+# variables that tell how well a result is solved: their rounding is what they are there for
+OF_SOLUTION = (
+    "closure_residual", "condition", "power_residual", "friction_change", "friction_residual", "friction_contraction",
+    "seat_change", "energy_residual", "efficiency_error", "certificate",
+)  # fmt: skip
+
+
+def without_noise(result: xr.Dataset) -> xr.Dataset:
+    """A result as views show it: 0 where its numbers are rounding, but for those that tell of the solution."""
+    scales, cleared = scales_in(result), {}
+    for name, variable in result.data_vars.items():
+        if variable.dtype.kind != "f" or name in OF_SOLUTION or "units" not in variable.attrs:
+            continue
+        floors = scales.floor(unit_of(variable))
+        each = result.coords.get(variable.attrs.get(UNITS_OF_EACH))
+        if each is not None and each.ndim:
+            floors = each.copy(data=[scales.floor(str(unit)) for unit in each.values])
+        cleared[name] = variable.where(~(abs(variable) <= floors), 0.0)
+    return result.assign(cleared)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from trunnion.model.screen import in_use
+from trunnion.model.units import in_use
 
 __all__ = [
     "Units", "between", "common", "decimals", "decimals_of", "drawn_in", "joined", "number", "parts", "prefixed",

@@ -19,7 +19,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CYCLE", "LOCKING", "OF_SOME_JOINTS", "SAME_AS", "VARIABLES", "along_positions", "dataset", "variables"]
+__all__ = ["LOCKING", "OF_SOME_JOINTS", "SAME_AS", "VARIABLES", "along_positions", "dataset", "variables"]
 
 
 def _coordinate(

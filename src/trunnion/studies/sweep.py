@@ -38,8 +38,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.checks.check import check_values
-from trunnion.model.checks.units import bare_number
+from trunnion.model.checks.check import bare_number, check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
 from trunnion.results.attributes import cited, finding_rows, origin

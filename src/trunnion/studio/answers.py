@@ -27,8 +27,7 @@ from trunnion.model.file import text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of
-from trunnion.results.dataset import Column
-from trunnion.results.scales import without_noise
+from trunnion.results.dataset import Column, without_noise
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.run import prepare
 from trunnion.studio import changing, drawing

@@ -17,7 +17,7 @@ from math import degrees, pi
 from typing import Any
 
 from trunnion.model.quantity import Quantity
-from trunnion.model.renaming import renamed
+from trunnion.model.rewrite import renamed
 from trunnion.model.units import KINDS, unit
 from trunnion.studio.drawing import NUMBER, acted_on, free, letter, names_in_use, numbered, rename_point, vector
 from trunnion.studio.findings import spoken

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.model.changes import with_law
 from trunnion.model.csv_table import stated_files
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.scales import without_noise
+from trunnion.model.places import with_law
+from trunnion.results.dataset import without_noise
 from trunnion.results.tables import selected
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import rubbing

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import units_of
-from trunnion.results.dataset import units_along
+from trunnion.results.dataset import units_along, without_noise
 from trunnion.results.quantities import number, quantity
-from trunnion.results.scales import without_noise
 from trunnion.views.axis import Array, abscissa, column, is_spatial, layout, members, names, numbers, series
 from trunnion.views.bodies import Space, gathered
 from trunnion.views.curves import peak

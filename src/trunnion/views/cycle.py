@@ -18,9 +18,8 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, UnitError
 from trunnion.model.units import KINDS as UNITS
 from trunnion.results.attributes import attribute, summary_of
-from trunnion.results.dataset import units_along
+from trunnion.results.dataset import units_along, without_noise
 from trunnion.results.quantities import number, prefixed, quantity, scaled
-from trunnion.results.scales import without_noise
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.as_built import Seats, losses, outputs, point_errors, seat_angles, seated, worst_points
 from trunnion.views.axis import Array, abscissa, column, is_spatial, larger_end, layout, members, names

@@ -11,9 +11,8 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
-from trunnion.results.dataset import units_along
+from trunnion.results.dataset import units_along, without_noise
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.results.scales import without_noise
 from trunnion.views.axis import Abscissa, Array, abscissa, members, names
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Ring, Rule
 from trunnion.views.curves import check_kind, nth, peak

@@ -13,8 +13,8 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import Normal, Stroke
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.results.dataset import without_noise
 from trunnion.results.quantities import prefixed
-from trunnion.results.scales import without_noise
 from trunnion.views.axis import Array, members
 from trunnion.views.bodies import HALF, Scenery, Solid, Space, scenery, space
 from trunnion.views.curves import ease, usual_peak

@@ -9,9 +9,8 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
-from trunnion.results.dataset import units_along
+from trunnion.results.dataset import units_along, without_noise
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.results.scales import without_noise
 from trunnion.views.axis import abscissa, names
 from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Panel, Plot, Rule
 from trunnion.views.curves import ease, outside, silent, usual_peak

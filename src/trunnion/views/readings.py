@@ -12,9 +12,8 @@ import pandas as pd
 
 from trunnion.errors import Status
 from trunnion.results.attributes import attribute
-from trunnion.results.dataset import units_along
+from trunnion.results.dataset import units_along, without_noise
 from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
-from trunnion.results.scales import without_noise
 from trunnion.views.axis import Abscissa, Array, abscissa, names
 from trunnion.views.page import NONE
 

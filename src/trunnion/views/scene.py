@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.joints.pairs import GUIDED, PAIRS
 from trunnion.results.attributes import attribute, units_of
-from trunnion.results.dataset import units_along
-from trunnion.results.scales import without_noise
+from trunnion.results.dataset import units_along, without_noise
 from trunnion.solve.system import System
 from trunnion.views.as_built import built, losses
 from trunnion.views.axis import abscissa, column, intervals, larger_end, layout, members, names, numbers, series

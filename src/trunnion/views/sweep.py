@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import without_noise
 from trunnion.results.quantities import SUPERSCRIPT, WORDS, prefixed
-from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.studies.sweep import FIGURES

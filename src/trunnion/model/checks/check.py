@@ -1,4 +1,4 @@
-"""Checks of a model that need nothing but the model: names, dimensions, and data that no linkage can have.
+"""Checks of a model that need nothing but the model: names, dimensions, units, and data that no linkage can have.
 
 They run in stages, each of which may take for granted what the one before has found sound: first what names refer to,
 then how parts and units go together, last the numbers. What needs the structure (whether the drivers suffice, whether
@@ -7,24 +7,23 @@ it can be assembled) is checked where the structure is known.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.joints.pairs import PAIRS
-from trunnion.model.checks import joints, measures, parts, tolerances, units
-from trunnion.model.joint_parts import has_pin, motions
+from trunnion.model.checks import joints, parts, tolerances
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Entry, ParameterSet, dimension_errors
-from trunnion.model.parts import AT, InertiaTensor, Link
-from trunnion.model.quantity import evaluation_order
+from trunnion.model.parts import AT, USUAL_PRESSURE_ANGLE, InertiaTensor, Link
+from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import InSpace, Refers, faults, group_findings, key_findings, limit_findings
 from trunnion.model.tolerances import Varying, ends_motion
-from trunnion.model.units import ANY, Dimension, UnitError
+from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, UnitError, unit
 
-__all__ = ["check_model", "check_values"]
+__all__ = ["bare_number", "check_model", "check_values", "in_radians"]
 
 Values = Mapping[str, Number]
 # of the largest moment, by which a flat body may violate the triangle inequality: of four digits, of three or two
@@ -61,7 +60,7 @@ def _references(mechanism: Varying) -> Iterator[Finding]:
             yield from Refers("point" if point else "any joint").missing(name, f"assembly.{name}", mechanism)
         yield from InSpace().counted(hint, f"assembly.{name}", mechanism)
     for name, measure in mechanism.measures.items():
-        yield from measures.check_measure(mechanism, measure, f"measures.{name}")
+        yield from tolerances.check_measure(mechanism, measure, f"measures.{name}")
 
 
 def _together(mechanism: Varying) -> Iterator[Finding]:
@@ -91,7 +90,7 @@ def _together(mechanism: Varying) -> Iterator[Finding]:
 def _numbers(mechanism: Varying) -> Iterator[Finding]:
     """What the numbers make impossible or doubtful."""
     yield from check_values(mechanism, mechanism.parameter_set)
-    yield from units.forgotten_units(mechanism)
+    yield from forgotten_units(mechanism)
     yield from tolerances.tolerance_values(mechanism)
     yield from tolerances.cost_values(mechanism)
 
@@ -123,7 +122,7 @@ def _quantities(mechanism: Varying) -> Iterator[Finding]:
                 sound.append((entry, sayable))
             except UnitError as error:
                 yield Finding(error.what, entry.where, error.remedy)
-    yield from units.plain_angles(mechanism, sound)
+    yield from plain_angles(mechanism, sound)
     used = {name for entry in entries for name in entry.quantity.names}
     rubs = any(joint.friction is not None for joint in mechanism.effective_joints.values())
     remedy = "remove it" if rubs else "remove it, unless it is of friction, which is off"
@@ -173,7 +172,7 @@ def _hints(mechanism: Varying) -> Iterator[Finding]:
     moving = [link for link in mechanism.points if link != mechanism.fixed_link]
     for name, hint in mechanism.assembly.items():
         where, joint = f"assembly.{name}", mechanism.effective_joints.get(name)
-        pair, position = PAIRS[joint.type] if joint else None, isinstance(hint, tuple)
+        pair, position = joint.pair if joint else None, isinstance(hint, tuple)
         if isinstance(hint, str):
             if name not in moving:
                 what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
@@ -184,7 +183,7 @@ def _hints(mechanism: Varying) -> Iterator[Finding]:
                 yield Finding(what, where, "write its coordinate, as at: 30 deg" if mechanism.drivers else "remove it")
         elif "." in name and not position:
             yield Finding("a point has a position, not an angle", where, f"write {mechanism.position_form}")
-        elif joint and pair and not position and not (motions(joint.type) or pair.crossed):
+        elif joint and pair and not position and not (joint.pair.motions or pair.crossed):
             what = f"one number does not state how far a {joint.type} joint has moved"
             yield Finding(what, where, f"state where it is: {mechanism.position_form}")
 
@@ -229,7 +228,7 @@ def check_values(
     if "links" in sections:
         yield from _sides(mechanism, values)
     if "measures" in sections:
-        yield from measures.measure_values(mechanism, numbers)
+        yield from tolerances.measure_values(mechanism, numbers)
 
 
 def _alone(numbers: ParameterSet, path: str) -> Iterator[Finding]:
@@ -262,7 +261,7 @@ def _sides(mechanism: Varying, values: Values) -> Iterator[Finding]:
                     yield Finding(what, f"{path}.x", "give a direction across the axis, or none")
         ends = {key: joint for key, joint in mechanism.effective_joints.items()
                 if name in joint.links and key in link.points}  # fmt: skip
-        turn = all(has_pin(joint.type) for joint in ends.values())
+        turn = all(joint.pair.turns for joint in ends.values())
         if spatial or len(ends) != 2 or not turn or not geared.isdisjoint(ends):
             continue
         first, second = ([values[f"links.{name}.points.{key}.{axis}"] for axis in "xy"] for key in ends)
@@ -311,3 +310,107 @@ def _mass(mechanism: Varying, link: Link, values: Values, where: str) -> Iterato
             if rounded:
                 what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"
             yield Finding(what, path, remedy, Severity.WARNING if rounded else Severity.ERROR)
+
+
+# ---- numbers whose unit was likely forgotten ------------------------------------------------------------------
+
+FAR = 20.0  # times the largest length with a unit: a plain length above it is none of this mechanism
+LENGTH = KINDS["length"]
+
+
+def forgotten_units(mechanism: Varying) -> Iterator[Finding]:
+    """Plain lengths far above those with a unit: one warning, so that a file in mm without units is one finding.
+
+    Where most lengths have a unit, far is more than the largest of them.
+    """
+    entries = [entry for entry in (*mechanism.entries, *mechanism.further_entries)
+               if entry.kind is LENGTH and not (entry.alias or entry.varies or ".values." in entry.path)
+               and not entry.path.startswith("assembly.")]  # fmt: skip
+    dimensions, names = mechanism.dimensions, mechanism.parameter_set.dimension_values
+    with_unit, stated = 0.0, 0  # of lengths with a unit the largest of a point of a link, and how many there are
+    plain: dict[str, float] = {}  # those without, by their place
+    for entry in entries:
+        bare = [f"dimensions.{name}" for name in entry.quantity.names
+                if not isinstance(dimensions[name].source, str) and _is_length(name, entry.quantity)]  # fmt: skip
+        value = abs(float(entry.quantity.evaluate(names)))
+        if not isinstance(entry.quantity.source, str) or bare:
+            plain.setdefault(next(iter(bare), entry.where), value)
+        elif value > 0:
+            stated += 1
+            if entry.path.startswith("links.") and ".points." in entry.path:
+                with_unit = max(with_unit, value)
+    plain = {where: value for where, value in plain.items() if value > 0}
+    far = with_unit if stated > len(plain) else FAR * with_unit
+    doubtful = {where: value for where, value in plain.items() if value > far > 0}
+    if doubtful:
+        where, others = max(doubtful, key=doubtful.__getitem__), len(doubtful) - 1
+        value, also = doubtful[where], f", as are {others} others without a unit" * (others > 0)
+        what = f"is {value:g} m, {value / with_unit:.3g} times the largest length with a unit, {with_unit:g} m{also}"
+        yield Finding(f"{what}: a unit forgotten?", where, f"write it, as {value:g} mm", Severity.WARNING)
+
+
+def _is_length(name: str, quantity: Quantity) -> bool:
+    """Whether a dimension is a length where an expression speaks of it: as a plain factor it makes no sense there."""
+    try:
+        quantity.check({operand: NUMBER if operand == name else None for operand in quantity.names}, LENGTH)
+    except UnitError:
+        return True
+    return False
+
+
+def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Finding]:
+    """A warning of a number without a unit, for one that the model states with a unit, if it is nearer to that number
+    as it is written than to its value in SI."""
+    entry, before = numbers.entries.get(path), float(numbers.nominal.get(path, math.nan))
+    own_unit = entry.quantity.unit if entry else ""
+    if not own_unit or not abs(value * before) > 0:
+        return
+    written = before / float(unit(own_unit)[0])
+    if abs(math.log(abs(value / written))) < abs(math.log(abs(value / before))):
+        what = f"{value:g} is in SI units, where the model states {written:g} {own_unit}: a unit forgotten?"
+        yield Finding(what, path, f"write {value:g}{own_unit}", Severity.WARNING)
+
+
+Sayable = Mapping[str, Dimension | None]  # what an expression may speak of, and what each measures
+
+
+def plain_angles(mechanism: Varying, entries: Iterable[tuple[Entry, Sayable]]) -> Iterator[Finding]:
+    """What numbers without a unit mean that are taken as radians, of the rows of a table the largest.
+
+    entries: with what their expressions may speak of. In a model without any unit all is in SI, and only many turns are
+    told.
+    """
+    expressions = {name: quantity.expression for name, quantity in mechanism.dimensions.items()}
+    plain = [name for name, expression in expressions.items() if expression is None or expression.bare]
+    largest: dict[str, tuple[str, float, str]] = {}  # where each stands, its value and a verb for it
+    for entry, names in entries:
+        expression, angle = entry.quantity.expression, entry.kind is KINDS["angle"]
+        numbers = (
+            expression.unitless_angles(names, plain, angle) if expression else [float(entry.quantity.source)] * angle
+        )
+        for number in numbers:
+            of_dimension = isinstance(number, str)
+            value = float(mechanism.dimensions[number].evaluate()) if isinstance(number, str) else number
+            where = f"dimensions.{number}" if of_dimension else entry.where
+            rows = where if where.startswith("links.") else where.partition(".points.")[0]
+            if math.isfinite(value) and abs(value) > abs(largest.get(rows, ("", 0.0))[1]):
+                largest[rows] = (where, value, f"takes {value:g} for" if expression and not of_dimension else "is")
+    stated = (entry.quantity for entry in mechanism.entries if entry.quantity is not USUAL_PRESSURE_ANGLE)
+    with_units = any(quantity.unit for quantity in stated)
+    for where, value, verb in largest.values():
+        finding = in_radians(where, value, verb)
+        if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):
+            yield finding
+
+
+def in_radians(where: str, value: float, verb: str = "is") -> Finding:
+    """What a plain number of an angle means.
+
+    A whole number, or many turns, is a warning: it is likely meant in degrees; but a driver may well go through turns.
+    """
+    turned, integral = abs(value) > 2 * math.pi, value.is_integer() and value != 0
+    doubtful = integral or (turned and not where.startswith("drivers."))
+    size = f"{value / (2 * math.pi):.3g} turns" if turned else f"{math.degrees(value):.3g}°"
+    what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
+    remedy = f"write {value:g} deg if it is in degrees, else {value:g} rad"
+    return Finding(what, where, remedy, Severity.WARNING if doubtful else Severity.NOTE)

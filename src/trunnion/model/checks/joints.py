@@ -25,8 +25,6 @@ from trunnion.model.joint_parts import (
     Seat,
     clearance,
     contact_lacks,
-    has_guide,
-    has_pin,
     has_play,
     play,
 )
@@ -53,7 +51,7 @@ def _effects(joint: Joint, spatial: bool, decided: bool) -> list[tuple[str, bool
 
     decided: whether statics decides every reaction.
     """
-    pair, pin, seat, friction = PAIRS[joint.type], joint.pin, joint.seat, joint.friction
+    pair, pin, seat, friction = joint.pair, joint.pin, joint.seat, joint.friction
     law, model = (friction.law, friction.model) if friction else ("", "")
     in_play, on_axis = joint.contact is not None, spatial and not pair.ball
     leans = isinstance(seat, Seat) and seat.beta is not None and seat.beta.source != 0
@@ -148,7 +146,7 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
         yield Finding("no joint has play", "joint_defaults.seat", remedy, Severity.WARNING)
     for name, joint in mechanism.effective_joints.items():
         where = f"joints.{name}"
-        pair = PAIRS[joint.type]
+        pair = joint.pair
         if not spatial and not pair.planar:
             flat = ", ".join(kind for kind in PAIRS if PAIRS[kind].planar)
             yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
@@ -179,7 +177,7 @@ def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
         if name not in points:
             remedy = f"add {key}: {position} to the points of '{link}' ({nearest(name, points)})"
             yield Finding(f"the link '{link}' has no point '{name}'", f"joints.{name}", remedy)
-        elif mechanism.space in PAIRS[joint.type].needs_axis and points[name].axis is None:
+        elif mechanism.space in joint.pair.needs_axis and points[name].axis is None:
             axis = "[1, 0]" if mechanism.space == "planar" else "[0, 0, 1]"
             what = f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one"
             yield Finding(what, f"links.{link}.points.{name}", f"write {key}: {{at: {position}, axis: {axis}}}")
@@ -274,7 +272,7 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
     sizes = ["guide.length", *["pin.radius"] * (not rolls)]
     sizes += ["pin.bearing", "guide.width"] if mechanism.space == "spatial" else []
     between = float((clearance(name, values) or 0.0) + value("pin.cylindricity", 0.0))
-    unmodelled = has_pin(joint.type) and joint.type not in PLAY_PAIRS and between != 0
+    unmodelled = joint.pair.turns and joint.type not in PLAY_PAIRS and between != 0
     radius = f"radius: {1e3 * value('pin.radius'):.6g} mm, " * (value("pin.radius") >= 0)
     yield from faults(
         "",
@@ -305,7 +303,7 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
 def _fit(mechanism: Numbers, name: str) -> FitLimits | Finding | None:
     """The play of a joint's fit, or why it has none; None without a fit, or where its size has no value."""
     pin = mechanism.effective_joints[name].pin
-    if pin is None or pin.fit is None or not has_pin(mechanism.effective_joints[name].type):
+    if pin is None or pin.fit is None or not mechanism.effective_joints[name].pair.turns:
         return None
     sizes = nominal_dimensions(mechanism.dimensions) if pin.fit.size.names else {}
     try:
@@ -348,7 +346,7 @@ def _fitted(
 def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str, Number]) -> Iterator[Finding]:
     """A play so large, or a pin so short, that what is said of small plays no longer holds."""
     where, rho = f"joints.{name}", float(play(joint, name, values))
-    if not rho > 0 or has_guide(joint.type):
+    if not rho > 0 or joint.pair.guided:
         return
     radius, doubts = float(values.get(f"{where}.pin.radius", np.nan)), []
     side, distance, link = _shortest_side(mechanism, name, joint, values)
@@ -357,7 +355,7 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
     if rho > LARGE * distance and not meeting:
         share = f"{100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
         doubts.append(f"a play of {_mm(rho)} is {share}: above 1 % results for small play are inaccurate")
-    if mechanism.space == "spatial" and not PAIRS[joint.type].ball:
+    if mechanism.space == "spatial" and not joint.pair.ball:
         length = float(values.get(f"{where}.pin.length", values.get(f"{where}.pin.bearing", np.nan)))
         error = ellipse_error(rho, radius, length) if length > 0 else np.nan  # at β = π, 2 r play / length²
         if error > LARGE:
@@ -385,7 +383,7 @@ def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[
     for link in joint.links:
         for other, other_joint in mechanism.effective_joints.items():
             here, away = place(link, name), place(link, other)
-            if other != name and link in other_joint.links and here and away and has_pin(other_joint.type):
+            if other != name and link in other_joint.links and here and away and other_joint.pair.turns:
                 sides.append((other, float(np.linalg.norm(np.subtract(here, away))), link))
     return min((side for side in sides if side[1] > 0), key=lambda side: side[1])
 

@@ -11,7 +11,6 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import MOTION, PLACED, RESERVED
-from trunnion.model.joint_parts import freedoms, has_pin, motions
 from trunnion.model.measure_units import drive_kind
 from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import Numbers
@@ -22,7 +21,7 @@ from trunnion.model.units import ANY, KINDS, Dimension, UnitError, dimension_tex
 
 __all__ = [
     "driver_findings", "driver_values", "expression_name", "gear_values", "gears", "load_findings", "loop",
-    "motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name", "unread",
+    "motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name",
 ]  # fmt: skip
 
 Values = Mapping[str, Number]
@@ -34,9 +33,9 @@ def driver_findings(mechanism: Numbers) -> Iterator[Finding]:
     drivable = ", ".join(kind for kind, pair in PAIRS.items() if pair.drivable)
     for name, driver in mechanism.drivers.items():
         where, joint = f"drivers.{name}", mechanism.effective_joints[name]
-        pair, moved = PAIRS[joint.type], mechanism.effective_joints[driver.moves or name]
+        pair, moved = joint.pair, mechanism.effective_joints[driver.moves or name]
         moves = f"has {counted(pair.count, 'freedom')}" if pair.count else "does not move"
-        endless = not has_pin(moved.type) and driver.law == "constant" and driver.range is None
+        endless = not moved.pair.turns and driver.law == "constant" and driver.range is None
         natural = driver.points is not None and driver.ends == "natural"
         yield from faults(
             where,
@@ -67,7 +66,7 @@ def driver_values(mechanism: Numbers, name: str, values: Values) -> Iterator[Fin
     if driver.points is not None:
         begin, places = value("points.0.time"), [value(f"points.{k}.coordinate") for k in range(len(driver.points))]
         gap, joint = places[-1] - places[0], mechanism.effective_joints[driver.moves or name]
-        turns = gap / (2 * np.pi) if has_pin(joint.type) else np.inf
+        turns = gap / (2 * np.pi) if joint.pair.turns else np.inf
         open_end = driver.periodic and abs(gap) > 1e-9 * np.max(np.abs(places))
         yield from faults(
             where,
@@ -99,7 +98,7 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
     joints = mechanism.effective_joints
     for name, gear in mechanism.gears.items():
         where, (first, second) = f"gears.{name}", gear.joints
-        sliding = [joint for joint in gear.joints if not has_pin(joints[joint].type)]
+        sliding = [joint for joint in gear.joints if not joints[joint].pair.turns]
         shared, screw = {*joints[first].links} & {*joints[second].links}, gear.lead is not None
         yield from faults(
             where,
@@ -156,7 +155,7 @@ def loop(mechanism: Numbers) -> Iterator[Finding]:
            f"use one of {', '.join(LOOP_PAIRS)}, or state links and joints instead") for row in rows),
         *((getattr(row, freedom) is not None, f"loop.{row.joint}.{freedom}",
            f"the {freedom} of a {row.type} joint is free, not constant")
-          for row in rows for freedom in motions(row.type)),
+          for row in rows for freedom in row.pair.motions),
     )  # fmt: skip
     for name, link in mechanism.links.items():
         ends = [joint for joint, entry in mechanism.effective_joints.items() if name in entry.links]
@@ -189,7 +188,7 @@ def motion_dimensions(mechanism: Numbers, names: Dimensions) -> dict[str, Dimens
     if next(iter(mechanism.drivers), "") in mechanism.effective_joints:
         kinds |= {"drive": drive_kind(mechanism), "speed": RATES[drive_kind(mechanism)]}
     for name, joint in mechanism.effective_joints.items():
-        for freedom in motions(joint.type):
+        for freedom in joint.pair.motions:
             kind = KINDS["angle" if freedom == "rotation" else "length"]
             kinds |= {f"{name}.{freedom}": kind, f"{name}.{freedom}_velocity": RATES[kind]}
     for point in mechanism.named("point"):
@@ -312,7 +311,7 @@ def _cycle(mechanism: Numbers, over: str, values: Values) -> tuple[float, str]:
     first = next(iter(mechanism.drivers), "")
     joint, driver = mechanism.effective_joints.get(first), mechanism.drivers.get(first)
     if over == "drive":
-        return (2 * np.pi if joint and "rotation" in freedoms(joint.type) else np.nan), "deg"
+        return (2 * np.pi if joint and joint.pair.turns else np.nan), "deg"
     if driver is not None and len(mechanism.drivers) == 1 and driver.law != "table" and not driver.moves:
         before = f"drivers.{first}."
         numbers = {path.removeprefix(before): value for path, value in values.items() if path.startswith(before)}
@@ -332,13 +331,13 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
     for name, spring in mechanism.springs.items():
         where, joint = f"springs.{name}", mechanism.effective_joints.get(spring.joint or "")
         ends = {end.partition(".")[0] for end in spring.between or ()}
-        turns = joint is not None and "rotation" in freedoms(joint.type)
+        turns = joint is not None and joint.pair.turns
         key, other = ("free_angle", "free_length") if turns else ("free_length", "free_angle")
         free, stiff = getattr(spring, key) is not None, spring.stiffness is not None
         yield from faults(
             where,
             (len(ends) == 1, "between", f"both ends are on the link '{min(ends, default='')}'"),
-            (joint is not None and not motions(joint.type), "joint",
+            (joint is not None and not joint.pair.motions, "joint",
              f"a {joint and joint.type} joint has no one axis for a spring to act about or along",
              f"put it in a {ONE_AXIS}, or between two points"),
             (getattr(spring, other) is not None, other, f"this spring has no {other}", f"state {key} instead"),
@@ -373,7 +372,7 @@ def load_findings(mechanism: Numbers) -> Iterator[Finding]:
     spatial = mechanism.space == "spatial"
     for name, load in mechanism.loads.items():
         where, joint = f"loads.{name}", mechanism.effective_joints.get(load.joint or "")
-        points, freed = mechanism.points.get(load.link or "", ()), motions(joint.type) if joint else ()
+        points, freed = mechanism.points.get(load.link or "", ()), joint.pair.motions if joint else ()
         resists = {"resisting_torque": "rotation", "resisting_force": "slide"}
         yield from faults(
             where,

@@ -18,7 +18,7 @@ from trunnion.results.tables import cycle, studies
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["GROUPS", "KINDS", "check_table", "columns", "in_model_units", "kind_of", "selected", "table_of"]
+__all__ = ["KINDS", "check_table", "columns", "in_model_units", "kind_of", "selected", "table_of"]
 
 TABULAR = (".csv", ".parquet", ".xlsx")  # files whose name says which table; the others hold the whole result
 
@@ -27,12 +27,7 @@ OF_CONTACTS = ("impacts", "spectrum")  # tables of a motion in which a joint is 
 # the kinds of results: of each its tables by name, the one that a file holds first if its name says nothing else
 KINDS: dict[str, Mapping[str, Callable[[Any], list[Column]]]] = {
     "cycle": {"positions": cycle.positions},
-    "motion": {
-        "times": cycle.times,
-        "events": cycle.events,
-        "impacts": cycle.impacts,
-        "spectrum": cycle.spectrum,
-    },
+    "motion": {"times": cycle.times, "events": cycle.events, "impacts": cycle.impacts, "spectrum": cycle.spectrum},
     "sweep": {"points": studies.points},
     "play": {"positions": studies.played},
     "assembly": {"positions": studies.fitted},

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "events", "impacts", "locking", "motion", "of_members", "positions", "rest", "spectrum", "status_column",
-    "time_column", "times",
+    "events", "impacts", "locking", "motion", "positions", "rest", "spectrum", "status_column", "time_column",
+    "times",
 ]  # fmt: skip
 
 Stems = Mapping[str, str]  # by variable: what stands behind the name of the member

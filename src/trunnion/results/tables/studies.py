@@ -26,7 +26,7 @@ from trunnion.results.tables.cycle import status_column, time_column
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["COMPARISON", "CURVES", "IDENTIFICATION", "TOLERANCE", "courses", "fitted", "played", "points", "swept"]
+__all__ = ["COMPARISON", "IDENTIFICATION", "TOLERANCE", "courses", "fitted", "played", "points", "swept"]
 
 COURSES = ("measured", "scatter", "uncertainty", "expanded", "model", "residual", "compared")
 FIGURES = ("start", "estimate", "standard_uncertainty", "lower", "upper")

@@ -17,8 +17,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationErro
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part, forms, problem
 from trunnion.model.file import Lines, place, read_entries
-from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
+from trunnion.model.places import schema_findings
 from trunnion.model.schema import SchemaGenerator
 from trunnion.model.units import UnitError
 from trunnion.rig.reading import units

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import reading
-from trunnion.model.csv_text import NOTHING, TIME, bare, cells_of, heading, number, numbered, separator_of, units_below
+from trunnion.model.csv_table import NOTHING, TIME, bare, cells_of, heading, number, numbered, separator_of, units_below
 from trunnion.rig.reading.units import dimensions
 
 __all__ = ["FORMATS", "Column", "DataTable", "read_table"]

@@ -27,8 +27,8 @@ from pydantic import Field, ValidationError
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part
 from trunnion.model.file import place, read_entries
-from trunnion.model.findings import schema_findings
 from trunnion.model.measure_table import MEASURES
+from trunnion.model.places import schema_findings
 from trunnion.model.units import UnitError
 from trunnion.rig.reading import units
 from trunnion.rig.reading.mapping import Accuracies, Pulses

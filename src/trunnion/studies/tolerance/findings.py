@@ -22,9 +22,8 @@ from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.checks.check import check_values
-from trunnion.results.attributes import Figure
+from trunnion.results.attributes import Figure, extreme_place
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
-from trunnion.results.scales import extreme_place
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, limited
 from trunnion.studies.tolerance.sampling import Indices, Samples
 from trunnion.studies.tolerance.search import Corner

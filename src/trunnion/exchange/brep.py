@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.optimize import minimize_scalar
 
 from trunnion.exchange.draft import Array, Place, perpendicular, refused, steiner
 from trunnion.exchange.part21 import Part21
@@ -25,7 +22,7 @@ __all__ = ["Face", "Geometry", "Solid", "mass_of", "moments_of", "moved"]
 
 GAUSS = np.polynomial.legendre.leggauss(12)  # along an edge, a piece of at most 45°
 INNER = np.polynomial.legendre.leggauss(24)  # across a face: exact for powers, 1e-14 for a full turn of a torus
-CLOSED = 1e-9  # rad: an arc shorter than this is a full turn
+CLOSED = 1e-6  # rad: an arc shorter than this is a full turn; of a spline, by which its ends may miss its vertices
 KINDS = {
     "PLANE": "plane",
     "CYLINDRICAL_SURFACE": "cylinder",
@@ -145,10 +142,7 @@ class Geometry:
     # ---- edges ---------------------------------------------------------------------------------------------
 
     def edge(self, number: int) -> tuple[Array, Array, Array]:
-        """Nodes, m, weighted tangents and ends of an EDGE_CURVE: ∫ f dq = Σ f(node) · tangent.
-
-        UnreadError if its curve is of a kind that is not read.
-        """
+        """Nodes, m, weighted tangents and ends of an EDGE_CURVE: ∫ f dq = Σ f(node) · tangent; or UnreadError."""
         if number not in self._edges:
             _, start, end, curve, same = self.file.args(number, "EDGE_CURVE")
             ends = [self.point(self.file.args(vertex, "VERTEX_POINT")[1]) for vertex in (start, end)]
@@ -161,36 +155,25 @@ class Geometry:
         if kind in WRAPPED:
             return self._nodes(entity[kind][1], ends, closed, same)
         if kind == "LINE":
-            return _segment(ends[0], ends[1])
+            start, span = ends[0], ends[1] - ends[0]
+            return _gauss(lambda t: (start + np.outer(t, span), np.outer(t**0, span)), [0, 1])
         if "B_SPLINE_CURVE_WITH_KNOTS" in entity:
             return self._spline_nodes(entity, ends, closed, same)
-        if kind not in ("CIRCLE", "ELLIPSE", "HYPERBOLA", "PARABOLA"):
+        if kind not in ("CIRCLE", "ELLIPSE"):
             raise UnreadError(f"a curve {kind}")
         frame, centre = self.placement(entity[kind][1])
         sizes = [self.length * float(size) for size in entity[kind][2:]]
-        a, b = (sizes[0], sizes[-1]) if kind != "PARABOLA" else (sizes[0], 2 * sizes[0])
-
-        def parameter(point: Array) -> float:
-            x, y = frame[0] @ (point - centre) / a, frame[1] @ (point - centre) / b
-            return float({"HYPERBOLA": np.arcsinh(y), "PARABOLA": y}.get(kind, np.arctan2(y, x)))
-
-        first, last = parameter(ends[0]), parameter(ends[1])
-        if kind in ("CIRCLE", "ELLIPSE"):
-            turn = (last - first if same else first - last) % (2 * math.pi)
-            turn = 2 * math.pi if closed or turn < CLOSED else turn
-            last = first + (turn if same else -turn)
-        functions: Sequence[Callable[[Array], Array]] = {
-            "HYPERBOLA": (np.cosh, np.sinh, np.sinh, np.cosh),
-            "PARABOLA": (np.square, np.array, lambda t: 2 * t, np.ones_like),
-        }.get(kind, (np.cos, np.sin, lambda t: -np.sin(t), np.cos))
+        a, b = sizes[0] * frame[0], sizes[-1] * frame[1]
+        first, last = (math.atan2((p - centre) @ b / (b @ b), (p - centre) @ a / (a @ a)) for p in ends)
+        turn = (last - first if same else first - last) % (2 * math.pi)
+        turn = 2 * math.pi if closed or turn < CLOSED else turn
 
         def course(t: Array) -> tuple[Array, Array]:
-            f, g, df, dg = (function(t) for function in functions)
-            along, across = a * frame[0], b * frame[1]
-            return centre + np.outer(f, along) + np.outer(g, across), np.outer(df, along) + np.outer(dg, across)
+            sine, cosine = np.sin(t), np.cos(t)
+            return centre + np.outer(cosine, a) + np.outer(sine, b), np.outer(cosine, b) - np.outer(sine, a)
 
-        pieces = max(1, math.ceil(abs(last - first) / (math.pi / 4)))
-        return _gauss(course, np.linspace(first, last, pieces + 1))
+        pieces = max(1, math.ceil(turn / (math.pi / 4)))
+        return _gauss(course, np.linspace(first, first + (turn if same else -turn), pieces + 1))
 
     def _spline_nodes(self, entity: Any, ends: list[Array], closed: bool, same: bool) -> tuple[Array, Array]:
         args = entity["B_SPLINE_CURVE_WITH_KNOTS"]
@@ -207,41 +190,16 @@ class Geometry:
             place = h[:, :3] / h[:, 3:]
             return place, (dh[:, :3] - place * dh[:, 3:]) / h[:, 3:]
 
-        low, high = float(knots[0]), float(knots[-1])
-        grid = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(knots)]))
-
-        def parameter(point: Array) -> float:
-            away = np.linalg.norm(course(grid)[0] - point, axis=1)
-            nearest = int(np.argmin(away))
-            around = grid[max(nearest - 1, 0)], grid[min(nearest + 1, len(grid) - 1)]
-            best = minimize_scalar(
-                lambda t: float(np.linalg.norm(course(np.array([t]))[0] - point)),
-                bounds=around,
-                method="bounded",
-                options={"xatol": 1e-12 * (high - low)},
-            )
-            at_ends = {low: away[0], high: away[-1], float(best.x): float(best.fun) + 1e-6 * self.length}
-            return min(at_ends, key=lambda t: at_ends[t])
-
-        first, last = (low, high) if closed else (parameter(ends[0]), parameter(ends[1]))
-        if closed and not same:
-            first, last = high, low
-        if first == last or (first < last) != same:
-            raise UnreadError("a spline that is cut across its seam")
-        inside = [knot for knot in knots if min(first, last) < knot < max(first, last)]
-        return _gauss(course, sorted([first, *inside, last], reverse=first > last))
+        breaks = np.unique(knots)[:: 1 if same else -1]
+        drawn = course(breaks[[0, -1]])[0]
+        if not closed and np.abs(drawn - ends).max() > CLOSED * np.ptp(points, axis=0).max():
+            raise UnreadError("a part of a spline")
+        return _gauss(course, breaks)
 
     def loop(self, number: Any) -> list[tuple[Array, Array, Array, int, bool]]:
         """The edges of a loop in its order: nodes, tangents, ends, number and whether it runs along its edge."""
-        kind = self.file.kind(number)
-        if kind == "POLY_LOOP":
-            points = [self.point(point) for point in self.file.args(number, kind)[1]]
-            pairs = zip(points, points[1:] + points[:1], strict=True)
-            return [(*_segment(a, b), np.array([a, b]), -1, True) for a, b in pairs]
-        if kind != "EDGE_LOOP":  # a vertex loop bounds a whole sphere or torus
-            return []
-        edges = []
-        for oriented in self.file.args(number, kind)[1]:
+        edges = []  # none of a vertex loop, which bounds a whole sphere or torus
+        for oriented in self.file[number].get("EDGE_LOOP", ["", []])[1]:
             *_, edge, along = self.file.args(oriented, "ORIENTED_EDGE")
             nodes, tangents, ends = self.edge(edge)
             edges.append((nodes, tangents if along else -tangents, ends, int(edge), bool(along)))
@@ -262,7 +220,7 @@ class Geometry:
         return Face(KINDS[kind], frame, origin, radius, outward, face, minor)
 
     def solid(self, number: int) -> Solid:
-        """A MANIFOLD_SOLID_BREP, BREP_WITH_VOIDS or FACETED_BREP."""
+        """A MANIFOLD_SOLID_BREP or BREP_WITH_VOIDS."""
         kind = self.file.kind(number)
         args = self.file[number][kind]
         shells = [(args[1], True)]
@@ -274,7 +232,7 @@ class Geometry:
         for shell, along in shells:
             for face in self.file[shell][self.file.kind(shell)][1]:
                 self._face(face, along, solid, used)
-        if any(used[edge, True] != used[edge, False] for edge, _ in used if edge >= 0):
+        if any(used[edge, True] != used[edge, False] for edge, _ in used):
             solid.doubts.append("its surface is not closed")
         if not solid.doubts and solid.moments[0, 0] < 0:  # inside out
             solid.moments = -solid.moments
@@ -309,18 +267,14 @@ class Geometry:
             return
         area, moments = _integrals(face, loops)
         face.area = area if face.outward else -area
-        if face.kind in ("sphere", "torus") and face.area <= 1e-12 * face.radius**2:
-            sign = 1.0 if face.outward else -1.0
-            full_area, full = _closed_surface(face)
-            face.area += full_area
-            moments = moments + full * sign
+        if face.kind == "sphere" and face.area <= 1e-12 * face.radius**2:  # its loops bound what is cut out of a ball
+            face.area += 4 * math.pi * face.radius**2
+            volume, at = 4 / 3 * math.pi * face.radius**3, face.origin
+            second = volume * (np.outer(at, at) + face.radius**2 / 5 * np.eye(3))
+            moments = moments + (1.0 if face.outward else -1.0) * moments_of(volume, volume * at, second)
         if not face.area > 0:
             solid.doubts.append("it has faces whose bounds run the wrong way round")
         solid.moments = solid.moments + moments
-
-
-def _segment(start: Array, end: Array) -> tuple[Array, Array]:
-    return _gauss(lambda t: (start + np.outer(t, end - start), np.outer(t**0, end - start)), [0, 1])
 
 
 def _gauss(course: Any, breaks: Any) -> tuple[Array, Array]:
@@ -348,12 +302,18 @@ def _integrals(face: Face, loops: list[tuple[Array, Array]]) -> tuple[float, Arr
     """∬ |n| and the moments by the divergence theorem over the part of a surface that loops bound.
 
     Both have the sign of the loops: positive if they run counter-clockwise as the surface's own normal sees them. Of a
-    sphere or torus they are determined but for a multiple of the closed surface.
+    sphere they are determined but for a multiple of the closed surface; a whole torus is not read.
     """
     if not loops:
         return 0.0, np.zeros((4, 4))
-    frame = _pole_free(face, loops) if face.kind == "sphere" else face.frame
-    places = (np.vstack([nodes for nodes, _ in loops]) - face.origin) @ frame.T
+    frame, places = face.frame, np.vstack([nodes for nodes, _ in loops]) - face.origin
+    if face.kind == "sphere":  # turned so that its axis stays away from the edges, where the longitude would jump
+        axes = np.random.default_rng(0).normal(size=(64, 3))
+        axes /= np.linalg.norm(axes, axis=1)[:, None]
+        axis = axes[int(np.argmin(abs(places @ axes.T).max(axis=0)))]
+        x = perpendicular(axis)
+        frame = np.array([x, np.cross(axis, x), axis])
+    places = places @ frame.T
     rates = np.vstack([tangents for _, tangents in loops]) @ frame.T
     (x, y, z), (dx, dy, dz) = places.T, rates.T
     if face.kind == "plane":
@@ -400,25 +360,3 @@ def _summed(q: Array, normal: Array, weights: Array) -> tuple[float, Array]:
     flux = total * (q * normal).sum(axis=-1)
     h, count = np.concatenate([np.ones_like(q[..., :1]), q], axis=-1), np.array([0, 1, 1, 1])
     return area, np.einsum("ij,ijk,ijl->kl", flux, h, h) / (3 + count + count[:, None])
-
-
-def _pole_free(face: Face, loops: list[tuple[Array, Array]]) -> Array:
-    """A frame of a sphere whose axis stays away from its edges, where the longitude would jump."""
-    places = np.vstack([nodes for nodes, _ in loops]) - face.origin
-    axes = np.random.default_rng(0).normal(size=(64, 3))
-    axes /= np.linalg.norm(axes, axis=1)[:, None]
-    axis = axes[int(np.argmin(abs(places @ axes.T).max(axis=0)))]
-    x = perpendicular(axis)
-    return np.array([x, np.cross(axis, x), axis])
-
-
-def _closed_surface(face: Face) -> tuple[float, Array]:
-    """Area and moments of a full sphere or torus."""
-    if face.kind == "sphere":
-        area, volume = 4 * math.pi * face.radius**2, 4 / 3 * math.pi * face.radius**3
-        central = volume * face.radius**2 / 5 * np.eye(3)
-    else:
-        area, volume = 4 * math.pi**2 * face.radius * face.minor, 2 * math.pi**2 * face.radius * face.minor**2
-        across = volume * (face.radius**2 + 0.75 * face.minor**2) / 2
-        central = face.frame.T @ np.diag([across, across, volume * face.minor**2 / 4]) @ face.frame
-    return area, moments_of(volume, volume * face.origin, volume * np.outer(face.origin, face.origin) + central)

@@ -17,9 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ezdxf import recover
-from ezdxf.lldxf.const import DXFError
 
-from trunnion.errors import MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
 from trunnion.exchange.drawing import AUXILIARY
 
@@ -39,9 +37,6 @@ TOUCH = 1e-5  # of the drawing: what lies nearer is in one place; rad, what diff
 UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}  # m, by $INSUNITS
 HALF = 1e-3  # rad, by which a half circle may differ from one
 NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
-# what the library lets through of damaged files; a generator that ends too early is a RuntimeError or a StopIteration
-SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, StopIteration,
-          TypeError, ValueError)  # fmt: skip
 Text = tuple[str, Array, str]  # layer, place and words
 
 
@@ -100,17 +95,12 @@ def read(path: Path, options: ImportOptions) -> Draft:
     """
     draft = Draft(plane=True)
     few(len(re.findall(rb"\n *0\r?\n[A-Z]|\x00[A-Z][A-Z0-9_]{2,}\x00", path.read_bytes())), MOST_OBJECTS, "objects")
-    try:
-        document, auditor = recover.readfile(path)
-        if auditor.has_errors or auditor.has_fixes:
-            mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
-            what = f"is damaged; what could be mended is read: {mended}"
-            draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
-        sketch = Sketch(document, UNITS.get(document.header.get("$INSUNITS", 0)) or draft.assumed_unit(options))
-    except MechanismError:
-        raise
-    except SPOILT:
-        raise refused("is no DXF, or too damaged to be read") from None
+    document, auditor = recover.readfile(path)
+    if auditor.has_errors or auditor.has_fixes:
+        mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
+        what = f"is damaged; what could be mended is read: {mended}"
+        draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
+    sketch = Sketch(document, UNITS.get(document.header.get("$INSUNITS", 0)) or draft.assumed_unit(options))
     marks = (*sketch.circles, *sketch.lines, *sketch.halves, *sketch.texts)
     few(len(marks), MOST_MARKS, "lines, circles and texts")
     places = [place for _, place, _ in sketch.circles]

@@ -164,6 +164,9 @@ def import_file(
         raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
     except (RecursionError, MemoryError):
         raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
+    except Exception as error:  # a library raises anything at a damaged file
+        what = f"is damaged, or not as its format has it: {type(error).__name__} {error}"[:200]
+        raise MechanismError(Finding(what, remedy="mend the file, or export it again", file=str(path))) from None
     draft.source = draft.source or path.name
     draft.name = draft.name or path.stem
     return complete(draft.checked(), ground, drive, rate, turns)

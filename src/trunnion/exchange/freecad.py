@@ -9,19 +9,15 @@ from __future__ import annotations
 
 import math
 import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element
 
 import numpy as np
-from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
 from scipy.spatial.transform import Rotation
 
-from trunnion.errors import MechanismError
 from trunnion.exchange.draft import PARALLEL, Body, Draft, ImportOptions, Pair, Place, few, free_name, refused
 
 __all__ = ["read"]
@@ -92,20 +88,21 @@ class DocumentObject:
 
 def read(path: Path, options: ImportOptions) -> Draft:
     """Read the assembly of a file."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            few(len(archive.namelist()), MEMBERS, "members")
-            few(archive.getinfo(MEMBER).file_size, LARGEST, f"bytes of {MEMBER}")
-            with archive.open(MEMBER) as stream:
-                objects = _objects(stream)
-    except MechanismError:
-        raise
-    except KeyError:
-        raise refused(f"has no {MEMBER}") from None
-    except DefusedXmlException:
-        raise refused(f"has entities in its {MEMBER}, which may hide anything") from None
-    except (zipfile.BadZipFile, zlib.error, ParseError, EOFError, NotImplementedError, RuntimeError, UnicodeError):
-        raise refused("is damaged, or no file of FreeCAD") from None
+    types, objects = dict[str, str](), dict[str, DocumentObject]()
+    with zipfile.ZipFile(path) as archive:
+        few(len(archive.namelist()), MEMBERS, "members")
+        few(archive.getinfo(MEMBER).file_size, LARGEST, f"bytes of {MEMBER}")
+        with archive.open(MEMBER) as stream:  # as it comes, so that what is not needed takes no memory
+            for number, (_, element) in enumerate(iterparse(stream)):
+                few(number, MOST, "elements")
+                name = element.get("name", "")
+                if element.tag == "Property" and name not in PROPERTIES:
+                    element.clear()
+                elif element.tag == "Object" and element.get("type"):
+                    types[name] = element.get("type", "")
+                elif element.tag == "Object":
+                    properties = {each.get("name", ""): each for each in element.iter("Property")}
+                    objects[name] = DocumentObject(name, types.get(name, ""), properties)
     assemblies = [each for each in objects.values() if each.type == ASSEMBLY]
     inner = {name for assembly in assemblies for name in assembly.links("Group")}
     outer = [assembly for assembly in assemblies if assembly.name not in inner]
@@ -115,30 +112,11 @@ def read(path: Path, options: ImportOptions) -> Draft:
     draft = Draft(outer[0].label)
     if len(outer) > 1:
         draft.lose("other assemblies", *(each.label for each in outer[1:]))
-    try:
-        _Assembly(objects, outer[0], draft).read()
-    except (ValueError, KeyError, IndexError):
-        raise refused("has a joint or placement that cannot be read") from None
+    _Assembly(objects, outer[0], draft).read()
     if not draft.pairs:
         raise refused("has no joint between two parts that is read")
     draft.lose("masses, which follow from shapes that only FreeCAD knows")
     return draft
-
-
-def _objects(stream: Any) -> dict[str, DocumentObject]:
-    """The objects of a document by name, read as it comes so that what is not wanted takes no memory."""
-    types, objects = dict[str, str](), dict[str, DocumentObject]()
-    for count, (_, element) in enumerate(iterparse(stream)):
-        few(count, MOST, "elements")
-        name = element.get("name", "")
-        if element.tag == "Property" and name not in PROPERTIES:
-            element.clear()
-        elif element.tag == "Object" and element.get("type"):
-            types[name] = element.get("type", "")
-        elif element.tag == "Object":
-            properties = {each.get("name", ""): each for each in element.iter("Property")}
-            objects[name] = DocumentObject(name, types.get(name, ""), properties)
-    return objects
 
 
 class _Assembly:
@@ -167,8 +145,14 @@ class _Assembly:
             draft.lose("parts without a joint", *loose)
         places = [frame.shift for both in self.frames.values() for frame in both]
         size = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
-        for name, (first, second) in self.frames.items():
-            self._compare(draft.pairs[name], first, second, APART * size)
+        for name, (first, second) in self.frames.items():  # they coincide but for what the kind of joint leaves free
+            kind, gap, axis = draft.pairs[name].type, second.shift - first.shift, first.matrix[:, 2]
+            if kind in ("cylindrical", "prismatic"):
+                gap = gap - (gap @ axis) * axis
+            tilt = 0.0 if kind == "spherical" else float(np.linalg.norm(np.cross(axis, second.matrix[:, 2])))
+            if np.linalg.norm(gap) > APART * size or tilt > PARALLEL:
+                what = f"its connectors are {1e3 * np.linalg.norm(gap):.3g} mm and {math.degrees(tilt):.3g}° apart"
+                draft.warn("exchange.apart", f"joints.{name}", what, "solve the assembly in FreeCAD and save it")
 
     def _members(self, group: DocumentObject, visited: set[str]) -> Iterator[DocumentObject]:
         """What an assembly or group holds, groups resolved."""
@@ -238,16 +222,6 @@ class _Assembly:
             pair.comments.append(f"{kind} joint of {' and '.join(paths)}")
             pair.limits = _limits(joint, kind, first.inverse @ second)
             draft.pairs[name], self.frames[name] = pair, (first, second)
-
-    def _compare(self, pair: Pair, first: Place, second: Place, most: float) -> None:
-        """A doubt where the frames of a joint do not coincide as its kind has it: the assembly was not solved."""
-        gap, axis = second.shift - first.shift, first.matrix[:, 2]
-        if pair.type in ("cylindrical", "prismatic"):
-            gap = gap - (gap @ axis) * axis
-        tilt = 0.0 if pair.type == "spherical" else float(np.linalg.norm(np.cross(axis, second.matrix[:, 2])))
-        if np.linalg.norm(gap) > most or tilt > PARALLEL:
-            what = f"its connectors are {1e3 * np.linalg.norm(gap):.3g} mm and {math.degrees(tilt):.3g}° apart"
-            self.draft.warn("exchange.apart", f"joints.{pair.name}", what, "solve the assembly in FreeCAD and save it")
 
 
 def _limits(joint: DocumentObject, kind: str, between: Place) -> tuple[float, float] | None:

@@ -5,26 +5,15 @@ from __future__ import annotations
 import io
 import itertools
 import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
-from defusedxml import DefusedXmlException, ElementTree
+from defusedxml import ElementTree
 
-from trunnion.errors import MechanismError
-from trunnion.exchange.draft import (
-    Array,
-    Body,
-    Draft,
-    ImportOptions,
-    Place,
-    few,
-    free_name,
-    refused,
-)
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Place, few, free_name, refused
 
 __all__ = ["read"]
 
@@ -32,10 +21,6 @@ MOST_BYTES, MOST_XML = 30_000_000, 20_000_000  # of a file; of the model of a 3M
 MOST_BODIES = 500
 DEEPEST = 8  # components of components in a 3MF
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
-TROUBLE = (
-    ArithmeticError, AttributeError, DefusedXmlException, ElementTree.ParseError, EOFError, ImportError, LookupError,
-    NotImplementedError, RuntimeError, TypeError, ValueError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
 Mesh = tuple[str, Array, Array]  # name, vertices in m, triangles
 
 
@@ -56,28 +41,25 @@ def read(path: Path, options: ImportOptions) -> Draft:
     """
     draft, suffix = Draft(), path.suffix.lower()
     few(path.stat().st_size, MOST_BYTES, "bytes")
-    try:
-        if suffix == ".3mf":
-            meshes = list(_of_3mf(path))
-        elif suffix == ".stl":
-            unit, mesh = draft.assumed_unit(options), trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type="stl")
-            meshes = [(path.stem, unit * np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int))]
-        else:
-            parts: Any = trimesh.load_scene(io.BytesIO(path.read_bytes()), file_type="glb").dump()
-            meshes = [
-                (part.metadata.get("name", "part"), np.asarray(part.vertices, dtype=float), np.asarray(part.faces))
-                for part in parts
-            ]
-    except MechanismError:
-        raise
-    except TROUBLE:
-        raise refused("cannot be read as a mesh, or is damaged") from None
+    if suffix == ".3mf":
+        meshes = list(_of_3mf(path))
+    elif suffix == ".stl":
+        unit, mesh = draft.assumed_unit(options), trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type="stl")
+        meshes = [(path.stem, unit * np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int))]
+    else:
+        parts: Any = trimesh.load_scene(io.BytesIO(path.read_bytes()), file_type="glb").dump()
+        meshes = [
+            (part.metadata.get("name", "part"), np.asarray(part.vertices, dtype=float), np.asarray(part.faces))
+            for part in parts
+        ]
     few(len(meshes), MOST_BODIES, "meshes")
     if not any(len(faces) for _, _, faces in meshes):
         raise refused("holds no triangles, or is cut off")
     draft.ground = "ground"
     draft.bodies["ground"] = Body("ground")
     for name, vertices, faces in meshes:
+        if np.any(faces >= len(vertices)) or np.any(faces < 0):
+            raise refused("has a triangle without a corner")
         body = _weighed(draft, free_name(name, draft.bodies), vertices, faces, options.density)
         draft.bodies[body.name] = body
     draft.lose("joints, which a mesh does not hold")
@@ -86,8 +68,6 @@ def read(path: Path, options: ImportOptions) -> Draft:
 
 def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: float) -> Body:
     """A body with the mass of a closed mesh; one that is open has none, and says so."""
-    if np.any(faces >= len(vertices)) or np.any(faces < 0):
-        raise refused("cannot be read as a mesh, or is damaged")
     body, mesh = Body(name), trimesh.Trimesh(vertices, faces, process=True)
     if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
         draft.warn("exchange.mesh", f"links.{name}", "has no triangles, or corners that are no numbers")
@@ -135,10 +115,8 @@ def _of_3mf(path: Path) -> Iterator[Mesh]:
             corners = [[float(v.get(k, "nan")) for k in "xyz"] for v in mesh.iterfind("{*}vertices/{*}vertex")]
             corners_of = mesh.iterfind("{*}triangles/{*}triangle")
             faces = [[int(t.get(k, "-1")) for k in ("v1", "v2", "v3")] for t in corners_of]
-            vertices, triangles = np.array(corners).reshape(-1, 3), np.array(faces, int).reshape(-1, 3)
-            if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(vertices):
-                raise ValueError("a triangle without a corner")
-            yield name, unit * (vertices @ place.matrix.T + place.shift), triangles
+            vertices = np.array(corners).reshape(-1, 3) @ place.matrix.T + place.shift
+            yield name, unit * vertices, np.array(faces, int).reshape(-1, 3)
         for component in part.iterfind("{*}components/{*}component"):
             yield from placed(component.get("objectid", ""), place @ _place(component), depth + 1)
 

@@ -18,24 +18,26 @@ from trunnion.exchange.robots import (
     APART,
     WORLD,
     Scene,
+    number,
     numbers,
     opening,
     parsed,
     spanning,
     stem,
     steps,
-    tensor,
+    tensor,  # fmt: skip
     text_of,
     turned,
     unit,
     written,
-)  # fmt: skip
+)
 from trunnion.exchange.skeleton import Positions
 from trunnion.joints.pairs import PAIRS
 
 __all__ = ["read", "write"]
 
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
+NAMES = {pair: name for name, pair in KINDS.items()}
 BRINGS = ("include", "attach", "replicate", "composite", "flexcomp", "extension")  # elements that stand for bodies
 IGNORED = {  # attributes that change the motion and are not read, by element
     "joint": ("damping", "frictionloss", "stiffness", "armature"),
@@ -50,15 +52,32 @@ def read(path: Path, options: ImportOptions) -> Draft:
     draft = reader.draft
     for part in root.findall("worldbody"):
         reader.contents(part, WORLD, Place(), part.get("childclass", "main"))
-    reader.weigh()
+    if shaped := [name for name in reader.shaped if name != WORLD]:
+        draft.lose("shape", *shaped)
+    if reader.unweighed:
+        what = f"have geoms whose mass is not found here, such as a mesh: {', '.join([*reader.unweighed][:10])}"
+        draft.warn("exchange.shape", "links", what, "state <inertial> for them, or mass and inertia in the model")
     reader.close_loops()
-    reader.find_drives()
-    for tag in ("contact", "tendon"):
-        for part in root.iterfind(f"{tag}/*"):
-            draft.lose(tag, part.get("name", part.tag))
+    key = root.find("keyframe/key")
+    control = (key.get("ctrl", "") if key is not None else "").split()
+    for count, part in enumerate(root.iterfind("actuator/*")):  # its speed is that of the first key
+        values = reader.with_defaults(part, "main")
+        joint, rate = values.get("joint", values.get("jointinparent")), 0.0
+        if joint not in draft.pairs:
+            draft.lose("actuator", values.get("name", part.tag))
+            continue
+        if part.tag == "velocity" and count < len(control):
+            gear = numbers(values.get("gear"), f"gear of {joint}", 0, (1,))[0]
+            rate = number(control[count], "ctrl of key") / (float(gear) or 1.0)
+        draft.drives[joint] = rate
+    for part in (*root.iterfind("contact/*"), *root.iterfind("tendon/*")):
+        draft.lose(part.tag, part.get("name", ""))
     for tag in BRINGS:
         if root.find(f".//{tag}") is not None:
             draft.lose(f"<{tag}> and the bodies in it, which MuJoCo writes in full when it saves the model")
+    for attribute in ("settotalmass", "inertiagrouprange"):
+        if attribute in reader.compiler:
+            draft.lose(f"{attribute} of the compiler")
     return reader.settled(WORLD, options.ground)
 
 
@@ -79,8 +98,9 @@ class _Reader(Scene):
             self.defaults[part.get("class", "main")] = self.defaults["main"]
         self.frames: dict[str, Place] = {WORLD: Place()}
         self.sites: dict[str, tuple[str, Array]] = {}
-        self.geoms: dict[str, list[tuple[Place, Mapping[str, str]]]] = defaultdict(list)
-        self.weighed: set[str] = set()
+        self.weighed = {WORLD}  # bodies whose mass is not that of their geoms
+        self.shaped: dict[str, None] = {}  # bodies with geoms
+        self.unweighed: dict[str, None] = {}  # those with geoms whose mass is not found here
         self.add_body(WORLD)
 
     def _defaults(self, part: Element, name: str, parent: str) -> None:
@@ -93,7 +113,7 @@ class _Reader(Scene):
         for child in part.findall("default"):
             self._defaults(child, child.get("class", ""), name)
 
-    def _with_defaults(self, element: Element, style: str) -> dict[str, str]:
+    def with_defaults(self, element: Element, style: str) -> dict[str, str]:
         """The attributes of an element with those of its class."""
         chosen = element.get("class", style)
         if chosen not in self.defaults:
@@ -108,14 +128,14 @@ class _Reader(Scene):
                 self.contents(child, body, inner, child.get("childclass", style))
             elif child.tag == "body":
                 self._body(child, body, frame, child.get("childclass", style))
-            elif child.tag in ("geom", "site"):
-                values = self._with_defaults(child, style)
-                placed = frame @ self._frame(values, child.tag)
-                if child.tag == "geom":
-                    self.geoms[body].append((placed, values))
-                elif "name" in values:
-                    self.sites[values["name"]] = body, placed.shift
-                    self.draft.bodies[body].points[values["name"]] = placed.shift
+            elif child.tag == "geom":
+                self._geom(self.with_defaults(child, style), body, frame)
+            elif child.tag == "site":
+                values = self.with_defaults(child, style)
+                if "name" in values:
+                    place = frame.at(self._frame(values, "site").shift)
+                    self.sites[values["name"]] = body, place
+                    self.draft.bodies[body].points[values["name"]] = place
 
     def _body(self, element: Element, parent: str, outer: Place, style: str) -> None:
         """Read a body with its joints: several are a row of bodies, the first joint next to the parent."""
@@ -124,30 +144,31 @@ class _Reader(Scene):
         self.frames[name] = frame = outer @ self._frame(element.attrib, f"body {name}")
         self._note_lost("body", element.attrib, name)
         joints = [part for part in element if part.tag in ("joint", "freejoint")]
-        links = [parent, *(f"{name}.{number + 1}" for number in range(len(joints) - 1)), name]
+        links = [parent, *(f"{name}.{count}" for count in range(1, len(joints))), name]
         for between in links[1:-1]:
             self.add_body(between)
             self.between.add(between)
-        for number, part in enumerate(joints):
-            self._joint(part, (links[number], links[number + 1]), frame, style)
+        for part, first, second in zip(joints, links, links[1:], strict=False):
+            self._joint(part, (first, second), frame, style)
         if not joints:
             self.add_pair(Pair(f"{name}.fixed", "fixed", (parent, name), frame.shift))
         inertial = element.find("inertial")
         if inertial is not None and self.compiler.get("inertiafromgeom") != "true":
             where = f"inertial of body {name}"
             placed = frame @ self._frame(inertial.attrib, where)
-            body.mass, body.centre = float(numbers(inertial.get("mass"), f"mass of {where}", 1)[0]), placed.shift
+            body.mass, body.centre = number(inertial.get("mass"), f"mass of {where}"), placed.shift
             if "fullinertia" in inertial.attrib:
                 matrix = tensor(*numbers(inertial.get("fullinertia"), f"fullinertia of {where}", 6))
             else:
                 matrix = np.diag(numbers(inertial.get("diaginertia"), f"diaginertia of {where}", 3, (0, 0, 0)))
             body.inertia = placed.inertia(matrix)
+        if inertial is not None or self.compiler.get("inertiafromgeom") == "false":
             self.weighed.add(name)
         self.contents(element, name, frame, style)
 
     def _joint(self, part: Element, links: tuple[str, str], frame: Place, style: str) -> None:
         """Read a joint; a free one is none."""
-        values = self._with_defaults(part, style)
+        values = self.with_defaults(part, style)
         kind = "free" if part.tag == "freejoint" else values.get("type", "hinge")
         name = values.get("name") or f"{links[1]}.joint{len(self.draft.pairs) + 1}"
         where = f"joint {name}"
@@ -162,7 +183,7 @@ class _Reader(Scene):
         automatic = limited == "auto" and self.compiler.get("autolimits") != "false"
         if "range" in values and kind != "ball" and (limited == "true" or automatic):
             ends = numbers(values["range"], f"range of {where}", 2)
-            ends = ends - numbers(values.get("ref"), f"ref of {where}", 1, (0,))
+            ends = ends - number(values.get("ref"), f"ref of {where}", 0)
             low, high = ends * (self.angle if kind == "hinge" else 1.0)
             pair.limits = float(low), float(high)
         self._note_lost("joint", values, name)
@@ -172,8 +193,6 @@ class _Reader(Scene):
         for key in IGNORED[tag]:
             if values.get(key, "0").strip() not in ("0", "false"):
                 self.draft.lose(key, name)
-
-    # Places and masses
 
     def _frame(self, values: Mapping[str, str], where: str) -> Place:
         """The frame that attributes state."""
@@ -205,38 +224,48 @@ class _Reader(Scene):
             rotation = Rotation.from_quat(unit(part("quat", 4), where), scalar_first=True).as_matrix()
         return Place(rotation, place)
 
-    def weigh(self) -> None:
-        """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
-        draft, source = self.draft, self.compiler.get("inertiafromgeom", "auto")
-        bodies = draft.bodies
-        if shaped := [name for name in self.geoms if name != WORLD]:
-            draft.lose("shape", *shaped)
-        low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
-        unknown = []
-        for name, geoms in self.geoms.items() if source != "false" else ():
-            for frame, values in geoms if name not in {*self.weighed, WORLD} else ():
-                solid = _solid(frame, values, name)
-                if solid is None:
-                    unknown.append(name)
-                elif low <= numbers(values.get("group"), "group of geom", 1, (0,))[0] <= high:
-                    bodies[name] = united(bodies[name], solid, name)
-        if unknown:
-            what = f"have geoms of a shape whose mass is not found here, a mesh for one: {', '.join(unknown[:10])}"
-            draft.warn("exchange.shape", "links", what, "state <inertial> for them, or mass and inertia in the model")
-        total = float(numbers(self.compiler.get("settotalmass"), "settotalmass", 1, (-1,))[0])
-        mass = sum(body.mass for body in bodies.values())
-        for body in bodies.values() if total > 0 and mass > 0 else ():
-            body.mass, body.inertia = body.mass * total / mass, body.inertia * total / mass
-
-    # Loops and drives
+    def _geom(self, values: Mapping[str, str], name: str, outer: Place) -> None:
+        """Add the mass of a geom to a body that states none."""
+        self.shaped[name] = None
+        frame, kind, of = outer @ self._frame(values, "geom"), values.get("type", "sphere"), f"of a geom of body {name}"
+        mass_stated = number(values["mass"], f"mass {of}") if "mass" in values else None
+        density = number(values.get("density"), f"density {of}", 1000)
+        weightless = mass_stated == 0 or (mass_stated is None and density == 0)
+        if name in self.weighed or kind in ("plane", "hfield") or weightless:
+            return
+        count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)
+        if not count or "mesh" in values or values.get("shellinertia") == "true":
+            self.unweighed[name] = None
+            return
+        size = numbers(values.get("size"), f"size {of}", 0)
+        if "fromto" in values:
+            ends = numbers(values["fromto"], f"fromto {of}", 6)
+            half = float(np.linalg.norm(ends[3:] - ends[:3])) / 2
+            size = np.array([size[0], half] if count == 2 else [size[0], size[0], half])
+        if len(size) < count or not (size[:count] > 0).all():
+            raise refused(f"has not {count} lengths above 0", f"size {of}")
+        a, b, c = (*size[:count], 0.0, 0.0)[:3]
+        if kind in ("sphere", "ellipsoid"):
+            axes = np.array([a, b, c]) if kind == "ellipsoid" else np.full(3, a)
+            volume, squares = 4 / 3 * math.pi * axes.prod(), axes**2 / 5
+        elif kind == "box":
+            volume, squares = 8 * a * b * c, np.array([a, b, c]) ** 2 / 3
+        else:  # of a cylinder of radius a and length 2 b; half a ball on both ends of a capsule
+            ball = 2 / 3 * a / (b + 2 / 3 * a) if kind == "capsule" else 0.0  # share of the balls
+            volume = 2 * math.pi * a * a * b / (1 - ball)
+            across = (1 - ball) * a * a / 4 + ball * a * a / 5
+            squares = np.array([across, across, (1 - ball) * b * b / 3 + ball * (a * a / 5 + b * b + 3 / 4 * a * b)])
+        mass = density * volume if mass_stated is None else mass_stated
+        inertia = frame.inertia(mass * np.diag(squares.sum() - squares))
+        self.draft.bodies[name] = united(self.draft.bodies[name], Body(name, mass, frame.shift, inertia), name)
 
     def close_loops(self) -> None:
         """Read equalities; points that two bodies share are a ball, on one line a pin, else a weld."""
         draft = self.draft
         shared: dict[tuple[str, str], list[tuple[str, Array]]] = defaultdict(list)
-        for number, part in enumerate(self.root.iterfind("equality/*")):
-            values = self._with_defaults(part, "main")
-            name = values.get("name") or f"loop{number + 1}"
+        for count, part in enumerate(self.root.iterfind("equality/*"), 1):
+            values = self.with_defaults(part, "main")
+            name = values.get("name") or f"loop{count}"
             if values.get("active") == "false":
                 draft.lose("equality that is not active", name)
             elif part.tag in ("connect", "weld"):
@@ -286,21 +315,6 @@ class _Reader(Scene):
             raise refused(what, where, "draw it assembled: poses of the bodies at which the loops close")
         return (first, second), place
 
-    def find_drives(self) -> None:
-        """Read driven joints; the speed is that of the first key for an actuator of velocity."""
-        key = self.root.find("keyframe/key")
-        control = (key.get("ctrl", "") if key is not None else "").split()
-        for number, part in enumerate(self.root.iterfind("actuator/*")):
-            values = self._with_defaults(part, "main")
-            joint, rate = values.get("joint", values.get("jointinparent")), 0.0
-            if joint not in self.draft.pairs:
-                self.draft.lose("actuator", values.get("name", part.tag))
-                continue
-            if part.tag == "velocity" and number < len(control):
-                gear = numbers(values.get("gear"), f"gear of {joint}", 0, (1,))[0]
-                rate = float(numbers(control[number], "ctrl of key", 1)[0] / (gear or 1.0))
-            self.draft.drives[joint] = rate
-
 
 def _onto(direction: Array, where: str) -> Array:
     """The least rotation that turns z onto a direction, as MuJoCo has it."""
@@ -310,39 +324,6 @@ def _onto(direction: Array, where: str) -> Array:
     if sine < 1e-15:
         return np.diag([1.0, 1.0, 1.0]) if z[2] > 0 else np.diag([1.0, -1.0, -1.0])
     return np.asarray(Rotation.from_rotvec(axis / sine * math.atan2(sine, z[2])).as_matrix())
-
-
-def _solid(frame: Place, values: Mapping[str, str], name: str) -> Body | None:
-    """The body of a geom, in global axes; None if its mass cannot be found."""
-    kind, where = values.get("type", "sphere"), f"size of a geom of body {name}"
-    mass_stated = numbers(values.get("mass"), f"mass of a geom of body {name}", 1)[0] if "mass" in values else None
-    density = float(numbers(values.get("density"), f"density of a geom of body {name}", 1, (1000,))[0])
-    if kind in ("plane", "hfield") or mass_stated == 0 or (mass_stated is None and density == 0):
-        return Body(name)
-    count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)
-    if not count or "mesh" in values or values.get("shellinertia") == "true":
-        return None
-    size = numbers(values.get("size"), where, 0)
-    if "fromto" in values:
-        ends = numbers(values["fromto"], "fromto of geom", 6)
-        half = float(np.linalg.norm(ends[3:] - ends[:3])) / 2
-        size = np.array([size[0], half] if count == 2 else [size[0], size[0], half])
-    if len(size) < count or not (size[:count] > 0).all():
-        raise refused(f"has not {count} lengths above 0", where)
-    a, b, c = (*size[:count], 0.0, 0.0)[:3]
-    if kind in ("sphere", "ellipsoid"):
-        axes = np.array([a, b, c]) if kind == "ellipsoid" else np.full(3, a)
-        volume, squares = 4 / 3 * math.pi * axes.prod(), axes**2 / 5
-    elif kind == "box":
-        volume, squares = 8 * a * b * c, np.array([a, b, c]) ** 2 / 3
-    else:  # of a cylinder of radius a and length 2 b; half a ball on both ends of a capsule
-        ball = 2 / 3 * a / (b + 2 / 3 * a) if kind == "capsule" else 0.0  # share of the balls
-        volume = 2 * math.pi * a * a * b / (1 - ball)
-        across = (1 - ball) * a * a / 4 + ball * a * a / 5
-        squares = np.array([across, across, (1 - ball) * b * b / 3 + ball * (a * a / 5 + b * b + 3 / 4 * a * b)])
-    mass = density * volume if mass_stated is None else float(mass_stated)
-    inertia = mass * np.diag(squares.sum() - squares)
-    return Body(name, mass, frame.shift, frame.inertia(inertia))
 
 
 # Out
@@ -382,40 +363,31 @@ def write(positions: Positions, path: Path) -> list[Finding]:
                 compiler.attrib.update(boundmass="1e-9", boundinertia="1e-12")
         for point, place in body.points.items():
             SubElement(element, "site", name=f"{name}.{point}", pos=text_of(place - origins[name]))
-    _write_loops(draft, cuts, origins, equality)
+    size = np.ptp([*origins.values()], axis=0).max() or 1.0
+    for pair in cuts:
+        half = (pair.length or size / 10) / 2 * pair.axis / np.linalg.norm(pair.axis)
+        anchors = {"spherical": {"": pair.at}, "revolute": {".1": pair.at - half, ".2": pair.at + half}}
+        for suffix, anchor in anchors.get(pair.type, {}).items():
+            first, second = pair.links
+            ends = {"body1": first, "body2": second, "anchor": text_of(anchor - origins[first])}
+            SubElement(equality, "connect", ends, name=f"{pair.name}{suffix}")
+    for name in (name for name in draft.bodies if "." in name):  # half of the body before the dot
+        SubElement(equality, "weld", name=name, body1=name.partition(".")[0], body2=name)
     if len(equality):
         root.append(equality)
     if draft.drives:
         actuator = SubElement(root, "actuator")
         for name in draft.drives:
             turn = f"{name}.turn" if draft.pairs[name].type in ("cylindrical", "helical") else name
-            gain = _inertia_at(draft, draft.pairs[name]) / STEP  # so that it holds its speed within a step or so
-            SubElement(actuator, "velocity", name=name, joint=turn, kv=text_of(gain))
+            pair, parts = draft.pairs[name], draft.bodies.values()
+            axis = pair.axis / np.linalg.norm(pair.axis)
+            # at most what it has to move, kg m² or kg: all bodies as one. So it holds its speed within a step or so
+            most = sum(float(axis @ (b.inertia + b.mass * steiner(pair.at - b.centre)) @ axis) for b in parts)
+            most = most if PAIRS[pair.type].turns else sum(b.mass for b in parts)
+            SubElement(actuator, "velocity", name=name, joint=turn, kv=text_of((most or 1.0) / STEP))
         SubElement(SubElement(root, "keyframe"), "key", name="drive", ctrl=text_of(list(draft.drives.values())))
     written(root, path)
     return draft.findings
-
-
-def _inertia_at(draft: Draft, pair: Pair) -> float:
-    """At most what a drive of a pair has to move, as if all bodies moved with it: kg m² about its axis, or kg."""
-    if not PAIRS[pair.type].turns:
-        return sum(body.mass for body in draft.bodies.values()) or 1.0
-    axis, bodies = pair.axis / np.linalg.norm(pair.axis), draft.bodies.values()
-    return sum(float(axis @ (b.inertia + b.mass * steiner(pair.at - b.centre)) @ axis) for b in bodies) or 1.0
-
-
-def _write_loops(draft: Draft, cuts: list[Pair], origins: Mapping[str, Array], equality: Element) -> None:
-    """Write what closes the loops: connects at balls and on the axes of pins, welds of halved bodies."""
-    size = np.ptp([*origins.values()], axis=0).max() or 1.0
-    for pair in cuts:
-        half = (pair.length or size / 10) / 2 * pair.axis / np.linalg.norm(pair.axis)
-        anchors = {"spherical": {"": pair.at}, "revolute": {".1": pair.at - half, ".2": pair.at + half}}
-        for number, anchor in anchors.get(pair.type, {}).items():
-            ends = {"body1": pair.links[0], "body2": pair.links[1], "anchor": text_of(anchor - origins[pair.links[0]])}
-            SubElement(equality, "connect", ends, name=f"{pair.name}{number}")
-    for name in draft.bodies:
-        if "." in name:
-            SubElement(equality, "weld", name=name, body1=name.partition(".")[0], body2=name)
 
 
 def _halved(draft: Draft, cuts: list[Pair]) -> Iterator[Pair]:
@@ -437,15 +409,13 @@ def _halved(draft: Draft, cuts: list[Pair]) -> Iterator[Pair]:
 
 def _write_joints(pair: Pair, body: Element, equality: Element) -> None:
     """Write a pair as the joints of a body."""
-    kinds = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
     for step in [pair] if pair.type == "spherical" else steps(pair):
         if step.type == "fixed":
             continue
-        joint = SubElement(body, "joint", name=step.name, type=kinds[step.type])
+        joint = SubElement(body, "joint", name=step.name, type=NAMES[step.type])
         if step.type != "spherical":
             joint.set("axis", text_of(step.axis))
-            if step.limits is not None:
-                joint.set("range", text_of(step.limits))
+            joint.attrib |= {} if step.limits is None else {"range": text_of(step.limits)}
     if pair.type == "helical" and pair.pitch is not None:
         ends = {"joint1": f"{pair.name}.slide", "joint2": f"{pair.name}.turn"}
         SubElement(equality, "joint", ends, name=pair.name, polycoef=text_of([0, pair.pitch / (2 * math.pi), 0, 0, 0]))

@@ -7,14 +7,13 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from xml.etree.ElementTree import Element, ElementTree, ParseError, TreeBuilder, indent
+from xml.etree.ElementTree import Element, ElementTree, ParseError, indent
 
 import numpy as np
 from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import DefusedXMLParser
+from defusedxml.ElementTree import fromstring
 
 from trunnion.algebra.dual import primal
-from trunnion.errors import MechanismError
 from trunnion.exchange.draft import (
     PARALLEL,
     Array,
@@ -32,30 +31,12 @@ from trunnion.exchange.skeleton import Positions
 __all__ = ["Scene", "laid_out", "numbers", "opening", "parsed", "spanning", "stem", "steps", "tensor",
            "text_of", "turned", "unit", "written"]  # fmt: skip
 
-MOST_BYTES, MOST_ELEMENTS, DEEPEST, MOST_PARTS = 10_000_000, 100_000, 200, 2_000
+MOST_BYTES, MOST_TAGS, MOST_PARTS = 10_000_000, 200_000, 2_000
 LONGEST = 1000  # characters of a row of numbers
 MEETING = 1e-8  # m, between the axes of joints that count as crossing
 APART = 1e-5  # m, between points of two bodies that a loop holds together, as a program writes their places
 WORLD = "world"
 LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds
-
-
-class _Builder(TreeBuilder):
-    """A tree of elements; MechanismError if it would fill the memory, or be too deep to walk through."""
-
-    count = depth = 0
-
-    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
-        """Count an element that begins."""
-        self.count, self.depth = self.count + 1, self.depth + 1
-        few(self.count, MOST_ELEMENTS, "elements")
-        few(self.depth, DEEPEST, "elements in one another")
-        return super().start(tag, attrs)
-
-    def end(self, tag: str, /) -> Element:
-        """Count an element that ends."""
-        self.depth -= 1
-        return super().end(tag)
 
 
 def parsed(path: Path, name: str) -> Element:
@@ -64,16 +45,14 @@ def parsed(path: Path, name: str) -> Element:
     Entities of its own and references to other files are refused, and so is a file that would fill the memory.
     """
     few(path.stat().st_size, MOST_BYTES, "bytes")
-    parser = DefusedXMLParser(target=_Builder())
+    text = path.read_bytes()
+    few(text.count(b"<"), MOST_TAGS, "tags")
     try:
-        parser.feed(path.read_bytes())  # in pieces, a huge token would be read again for each
-        root: Element = parser.close()
+        root: Element = fromstring(text)
     except DefusedXmlException:
         raise refused("declares entities of its own, which are not read", remedy="remove the DOCTYPE") from None
     except ParseError as error:
         raise refused(f"is no sound XML: {error}") from None
-    except MechanismError:
-        raise
     except (LookupError, ValueError):
         raise refused("has an unknown encoding", remedy="save it as UTF-8") from None
     if root.tag != name:
@@ -96,6 +75,11 @@ def numbers(text: str | None, where: str, count: int, default: Sequence[float] |
     if not np.isfinite(values).all():
         raise refused(f"is {text[:40]!r}, which is not finite", where)
     return values
+
+
+def number(text: str | None, where: str, default: float | None = None) -> float:
+    """The one number of a text."""
+    return float(numbers(text, where, 1, None if default is None else (default,))[0])
 
 
 def unit(vector: Array, where: str) -> Array:
@@ -281,7 +265,19 @@ class Scene:
         if not draft.pairs:
             raise refused("has no joints")
         few(max(len(draft.bodies), len(draft.pairs)), MOST_PARTS, "bodies or joints")
-        self._couple()
+        for name, other, ratio in self.couplings:  # a thread turns and slides one body; others are gears
+            coupled, ends = ratio, [draft.pairs[key] for key in (name, other) if key in draft.pairs]
+            if len(ends) == 2 and ratio:
+                slide, turn = ends
+                if slide.type == "revolute":
+                    slide, turn, coupled = turn, slide, 1 / ratio
+                along = float(slide.axis @ turn.axis / (np.linalg.norm(slide.axis) * np.linalg.norm(turn.axis)))
+                common = set(slide.links) & set(turn.links) & self.between
+                if (slide.type, turn.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
+                    turn.pitch = 2 * math.pi * coupled * along
+                    continue
+            what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
+            draft.warn("exchange.gears", "joints", what, "state it under gears in the model")
         self._join()
         busiest = max(draft.bodies, key=lambda name: len(draft.pairs_of(name)))
         start = next(name for name in (ground, world, busiest) if draft.pairs_of(name))
@@ -310,24 +306,6 @@ class Scene:
             body.points = points
         _rename(draft, names, joints)
         return draft
-
-    def _couple(self) -> None:
-        """Make a thread of two joints that turn and slide one body; others are gears, which are not read."""
-        draft = self.draft
-        for name, other, ratio in self.couplings:
-            coupled = ratio
-            ends = [draft.pairs[key] for key in (name, other) if key in draft.pairs]
-            if len(ends) == 2 and ratio:
-                slide, turn = ends
-                if slide.type == "revolute":
-                    slide, turn, coupled = turn, slide, 1 / ratio
-                along = float(slide.axis @ turn.axis / (np.linalg.norm(slide.axis) * np.linalg.norm(turn.axis)))
-                common = set(slide.links) & set(turn.links) & self.between
-                if (slide.type, turn.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
-                    turn.pitch = 2 * math.pi * coupled * along
-                    continue
-            what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
-            draft.warn("exchange.gears", "joints", what, "state it under gears in the model")
 
     def _join(self) -> None:
         """Make one pair of joints in a row, where there is such a pair."""

@@ -6,6 +6,8 @@ Both are written with every loop: joints of SDF may close them, in URDF those un
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
+from itertools import combinations
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -19,6 +21,7 @@ from trunnion.exchange.robots import (
     WORLD,
     Scene,
     laid_out,
+    number,
     numbers,
     opening,
     parsed,
@@ -55,8 +58,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if world is not None:
         gravity = numbers(world.findtext("gravity"), "gravity", 3, (0, 0, -9.8))
         draft.gravity = gravity if gravity.any() else None
-    for number, model in enumerate(models):
-        reader.add_model(model, f"{model.get('name', number)}::" if number else "", WORLD)
+    for count, model in enumerate(models):
+        reader.add_model(model, f"{model.get('name', count)}::" if count else "", WORLD)
     if root.find(".//include") is not None:
         draft.lose("models that it includes, which `gz sdf -p` writes in full")
     reader.add_joints()
@@ -95,8 +98,8 @@ class _Reader(Scene):
                 self.add_model(part, f"{name}::", base)
                 self.poses[name], self.attached[name] = (Place(), f"{name}::__model__"), f"{name}::__model__"
             elif part.tag == "plugin" and part.findtext("joint_name"):
-                rate = numbers(part.findtext("initial_velocity"), f"initial_velocity of {name}", 1, (0,))
-                self.draft.drives[prefix + part.findtext("joint_name", "").strip()] = float(rate[0])
+                rate = number(part.findtext("initial_velocity"), f"initial_velocity of {name}", 0)
+                self.draft.drives[prefix + part.findtext("joint_name", "").strip()] = rate
             elif part.tag == "plugin":
                 self.draft.lose("plugin", part.get("name", ""))
         for part in model.findall("joint"):  # its name may also be that of a link, in URDF and old files
@@ -105,8 +108,6 @@ class _Reader(Scene):
         for link in model.findall("link"):
             name = prefix + link.get("name", "link")
             self._weigh(link, name)
-            if link.find("visual") is not None or link.find("collision") is not None:
-                self.draft.lose("shape", name)
             if (model.findtext("static") or "").strip() in YES:
                 self.add_pair(Pair(f"{name}.static", "fixed", (WORLD, name), np.zeros(3)))
 
@@ -141,12 +142,14 @@ class _Reader(Scene):
             draft.warn("exchange.mass", f"links.{name}", what, "state its mass in the model")
             inertial = Element("inertial") if inertial is None else inertial
         frame = self.frame(name) @ _pose(inertial.find("pose"), f"inertial of {name}")
-        body.mass = float(numbers(inertial.findtext("mass"), f"mass of {name}", 1, (1,))[0])
         entries = [
-            float(numbers(inertial.findtext(f"inertia/i{key}"), f"i{key} of {name}", 1, (key[0] == key[1],))[0])
+            number(inertial.findtext(f"inertia/i{key}"), f"i{key} of {name}", key[0] == key[1])
             for key in ("xx", "yy", "zz", "xy", "xz", "yz")
         ]
+        body.mass = number(inertial.findtext("mass"), f"mass of {name}", 1)
         body.centre, body.inertia = frame.shift, frame.inertia(tensor(*entries))
+        if link.find("visual") is not None or link.find("collision") is not None:
+            draft.lose("shape", name)
 
     def add_joints(self) -> None:
         """Make pairs of the joints that were collected, and points of the frames."""
@@ -162,15 +165,15 @@ class _Reader(Scene):
             mimic = part.find("axis/mimic")
             if mimic is not None:
                 name = prefix + part.get("name", "")
-                ratio = float(numbers(mimic.findtext("multiplier"), f"mimic of {name}", 1, (1,))[0])
+                ratio = number(mimic.findtext("multiplier"), f"mimic of {name}", 1)
                 self.couplings.append((name, prefix + mimic.get("joint", ""), ratio))
         for name in self.attached:
             link = self._link(name)
             if link and not name.endswith("__model__") and name not in bodies:
                 bodies[link].points[name] = self.frame(name).shift
         for name in bodies:  # between joints of a row, as this program writes them
-            row, _, number = name.rpartition(".")
-            pairs = self.draft.pairs_of(name) if row and number.isdigit() else []
+            row, _, count = name.rpartition(".")
+            pairs = self.draft.pairs_of(name) if row and count.isdigit() else []
             if len(pairs) == 2 and all(pair.name.startswith(f"{row}.") for pair in pairs):
                 self.between.add(name)
         self.draft.drives = {name: rate for name, rate in self.draft.drives.items() if name in self.draft.pairs}
@@ -187,24 +190,20 @@ class _Reader(Scene):
             if not ends[-1]:
                 raise refused(f"joins {end!r}, which is no link of the file", where)
         for key in ("damping", "friction", "spring_stiffness"):
-            if any(numbers(value.text, f"{key} of {where}", 1, (0,))[0] for value in part.iter(key)):
+            if any(number(value.text, f"{key} of {where}", 0) for value in part.iter(key)):
                 self.draft.lose(key, name)
         pair = Pair(name, TYPES[kind], (ends[0], ends[1]), self.frame(where).shift)
         if pair.type not in ("spherical", "fixed"):
             pair.axis = self._axis(part, "axis", where, prefix)
             texts = [part.findtext(f"axis/limit/{end}", "inf").replace("inf", "1e16") for end in ("lower", "upper")]
-            low, high = (float(numbers(text, f"limit of {where}", 1)[0]) for text in texts)
+            low, high = (number(text, f"limit of {where}") for text in texts)
             pair.limits = (low, high) if max(abs(low), abs(high)) < UNLIMITED else None
         if pair.type == "universal":
             pair.second_axis = self._axis(part, "axis2", where, prefix)
             if abs(pair.axis @ pair.second_axis) > PARALLEL:
                 raise refused("turns about two axes that are not square to each other", where, "write two joints")
         if pair.type == "helical":
-            pitch, old = part.findtext("screw_thread_pitch"), part.findtext("thread_pitch")
-            if pitch is None and old is not None:  # rad/m, left-handed
-                pair.pitch = -2 * np.pi / float(numbers(old, f"thread_pitch of {where}", 1)[0] or np.inf)
-            else:
-                pair.pitch = float(numbers(pitch, f"screw_thread_pitch of {where}", 1)[0])
+            pair.pitch = number(part.findtext("screw_thread_pitch"), f"screw_thread_pitch of {where}")
         return pair
 
     def _axis(self, part: Element, tag: str, where: str, prefix: str) -> Array:
@@ -262,7 +261,7 @@ def write(positions: Positions, path: Path) -> list[Finding]:
     _leaf(world, "gravity", np.zeros(3) if draft.gravity is None else draft.gravity)
     model = SubElement(world, "model", name=draft.name or "mechanism")
     origins, inner, closing, rates = laid_out(draft, ("cylindrical", "planar"))
-    _add_joint(model, Pair("world", "fixed", (WORLD, draft.ground), np.zeros(3)), origins)
+    _add_joint(model, Pair(WORLD, "fixed", (WORLD, draft.ground), np.zeros(3)), origins)
     for name, origin in origins.items():
         link = SubElement(model, "link", name=name)
         _leaf_pose(link, origin)
@@ -277,8 +276,7 @@ def write(positions: Positions, path: Path) -> list[Finding]:
             _leaf_pose(SubElement(model, "frame", name=f"{name}.{point}", attached_to=name), place - origin)
     for pair in [*inner, *closing]:
         _add_joint(model, pair, origins)
-    for name, rate in rates.items():
-        _add_driver(model, name, rate)
+    _add_drivers(model, rates)
     written(root, path)
     return draft.findings
 
@@ -304,11 +302,12 @@ def _add_joint(model: Element, pair: Pair, origins: dict[str, Array]) -> None:
         _leaf(SubElement(joint, "axis2"), "xyz", pair.second_axis)
 
 
-def _add_driver(model: Element, joint: str, rate: float) -> None:
-    """Write the drive of a joint as Gazebo's controller of its speed."""
-    plugin = SubElement(model, "plugin", CONTROLLER)
-    _leaf(plugin, "joint_name", joint)
-    _leaf(plugin, "initial_velocity", rate)
+def _add_drivers(model: Element, rates: Mapping[str, float]) -> None:
+    """Write driven joints, with Gazebo's controllers of their speeds."""
+    for joint, rate in rates.items():
+        plugin = SubElement(model, "plugin", CONTROLLER)
+        _leaf(plugin, "joint_name", joint)
+        _leaf(plugin, "initial_velocity", rate)
 
 
 def _leaf(parent: Element, tag: str, content: str | float | Array) -> None:
@@ -366,31 +365,25 @@ def _model_of(root: Element) -> tuple[Element, str]:
             raise refused(what, f"joint {part.get('name')}", "state what closes a loop as an SDF joint under <gazebo>")
         inner.add(child)
         _add_pose(links[child], part, _end_of(part, "parent"))
-        model.append(_joint_of(part))
+        joint = SubElement(model, "joint", name=part.get("name", ""), type=part.get("type", ""))
+        joint.extend([*part.findall("parent"), *part.findall("child")])
+        axis, limit, mimic, dynamics = (part.find(tag) for tag in ("axis", "limit", "mimic", "dynamics"))
+        entries = SubElement(joint, "axis")
+        SubElement(entries, "xyz").text = "1 0 0" if axis is None else axis.get("xyz", "")
+        if limit is not None and part.get("type") != "continuous" and {"lower", "upper"} <= limit.attrib.keys():
+            ends = SubElement(entries, "limit")
+            for end in ("lower", "upper"):
+                SubElement(ends, end).text = limit.get(end)
+        if mimic is not None:
+            coupling = SubElement(entries, "mimic", joint=mimic.get("joint", ""))
+            SubElement(coupling, "multiplier").text = mimic.get("multiplier", "1")
+        for key, value in [] if dynamics is None else dynamics.items():
+            SubElement(entries, key).text = value
     model.extend(child for part in root.findall("gazebo") if part.get("reference") is None for child in part)
     outer = [name for name in links if name not in inner]
     if len(outer) != 1:
         raise refused(f"has {len(outer)} links without a parent: {', '.join(outer[:5])}", remedy="it must be a tree")
     return model, outer[0]
-
-
-def _joint_of(part: Element) -> Element:
-    """The SDF joint of a joint of URDF: its frame is that of its child."""
-    joint = Element("joint", name=part.get("name", ""), type=part.get("type", ""))
-    joint.extend([*part.findall("parent"), *part.findall("child")])
-    axis, limit, mimic, dynamics = (part.find(tag) for tag in ("axis", "limit", "mimic", "dynamics"))
-    made = SubElement(joint, "axis")
-    SubElement(made, "xyz").text = "1 0 0" if axis is None else axis.get("xyz", "")
-    if limit is not None and part.get("type") != "continuous" and {"lower", "upper"} <= limit.attrib.keys():
-        limit_element = SubElement(made, "limit")
-        for end in ("lower", "upper"):
-            SubElement(limit_element, end).text = limit.get(end)
-    if mimic is not None:
-        coupling = SubElement(made, "mimic", joint=mimic.get("joint", ""))
-        SubElement(coupling, "multiplier").text = mimic.get("multiplier", "1")
-    for key, value in [] if dynamics is None else dynamics.items():
-        SubElement(made, key).text = value
-    return joint
 
 
 def _add_pose(made: Element, source: Element, relative: str = "") -> None:
@@ -415,12 +408,11 @@ def _frames(draft: Draft, closes: bool) -> None:
             ends.append((frame, holder, pair.at))
             del draft.pairs[name], draft.bodies[frame]
     joined = {frozenset(pair.links) for pair in draft.pairs.values()}
-    for number, (name, body, place) in enumerate(ends if closes else []):
-        for other_name, other, other_place in ends[:number]:
-            if other != body and frozenset((body, other)) not in joined and np.linalg.norm(place - other_place) < APART:
-                draft.pairs[name] = Pair(name, "spherical", (other, body), place)
-                what = f"is taken as a ball that closes a loop: the frames {other_name} and {name} coincide"
-                draft.warn("exchange.loop", f"joints.{name}", what, "if it is a pin, make it revolute about an axis")
+    for (other_name, other, other_place), (name, body, place) in combinations(ends, 2) if closes else ():
+        if other != body and frozenset((body, other)) not in joined and np.linalg.norm(place - other_place) < APART:
+            draft.pairs[name] = Pair(name, "spherical", (other, body), place)
+            what = f"is taken as a ball that closes a loop: the frames {other_name} and {name} coincide"
+            draft.warn("exchange.loop", f"joints.{name}", what, "if it is a pin, make it revolute about an axis")
 
 
 def write_urdf(positions: Positions, path: Path) -> list[Finding]:
@@ -447,8 +439,7 @@ def write_urdf(positions: Positions, path: Path) -> list[Finding]:
         _tree_joint(root, pair, origins)
     for pair in closing:
         _add_joint(gazebo, pair, origins)
-    for name, rate in rates.items():
-        _add_driver(gazebo, name, rate)
+    _add_drivers(gazebo, rates)
     root.append(gazebo)
     written(root, path)
     return draft.findings

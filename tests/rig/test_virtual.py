@@ -195,7 +195,7 @@ def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> Non
     assert found.skipped == (2, 3)
     assert [case.number for case in found.cases] == [1]
     (finding,) = [one for one in found.findings if one.severity is Severity.WARNING]
-    assert "condition 2 (l2 = 80 mm) and 3 left out: cannot be assembled" in finding.what
+    assert "condition 2 (l2 = 80 mm) and 1 other left out: cannot be assembled" in finding.what
     assert finding.where == "schedule.conditions"
     assert not any(np.isnan(values).any() for values in next(found.records()).columns.values())
     assert found.truth()["left_out"] == [2, 3]

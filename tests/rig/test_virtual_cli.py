@@ -12,7 +12,7 @@ import pytest
 import trunnion
 from manual.conftest import Run, program
 from trunnion.errors import MechanismError
-from trunnion.rig.virtual import observation, rig_file
+from trunnion.rig.virtual import observe, rig_file
 from trunnion.rig.virtual.rig_file import Rig
 
 __all__ = ["program"]
@@ -144,7 +144,7 @@ def test_a_rig_that_fails_leaves_nothing(
     (tmp_path / "rig.yaml").write_text(GOOD.replace("rate: 1 kHz", "rate: 500 Hz"), encoding="utf-8")
     rig, model = Rig.read(tmp_path / "rig.yaml"), trunnion.read(FOUR_BAR)
     seen = trunnion.rig.observe(model, rig, 1)
-    write = observation.WRITERS[form]
+    write = observe.WRITERS[form]
 
     def fails(*arguments: Any) -> None:
         write(*arguments)
@@ -155,7 +155,7 @@ def test_a_rig_that_fails_leaves_nothing(
         (tmp_path / where / "notes.txt").write_text("of the laboratory", encoding="utf-8")
     before, folders = _files(tmp_path), sorted(tmp_path.iterdir())
     with monkeypatch.context() as patched:
-        patched.setitem(observation.WRITERS, form, fails)
+        patched.setitem(observe.WRITERS, form, fails)
         with pytest.raises(MechanismError if isinstance(error, OSError) else type(error)) as failure:
             trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     if isinstance(error, OSError):

@@ -13,7 +13,6 @@ from trunnion.rig.virtual.rig_file import (
     Sensor,
     SensorChannel,
     SensorErrors,
-    converted,
     draw,
     pulsed,
     readings,
@@ -116,8 +115,10 @@ def test_converter() -> None:
     """Steps of the span, clipped at the range, one step short at the upper end of the converter."""
     found = channel(range="8 N m", span="10 N m", bits=4)
     assert found.step == 1.25
-    assert converted(found, np.array([0.6, 0.7, -0.7, 9.0, -9.0, -0.1])).tolist() == [0.0, 1.25, -1.25, 7.5, -7.5, 0.0]
-    assert converted(channel(span="10 N m", bits=4, range="20 N m"), np.array([11.0, -11.0])).tolist() == [8.75, -10.0]
+    true, none = np.array([0.6, 0.7, -0.7, 9.0, -9.0, -0.1, 11.0, -11.0]), SensorErrors(0, 0, 0)
+    assert readings(found, true, slice(0, 8), 1.0, none, None).tolist() == [0.0, 1.25, -1.25, 7.5, -7.5, 0.0, 7.5, -7.5]
+    wide = channel(span="10 N m", bits=4, range="20 N m")
+    assert readings(wide, true, slice(0, 8), 1.0, none, None)[-2:].tolist() == [8.75, -10.0]
     assert channel().decimals == 9
     assert channel(noise="0.05 N m").decimals == 5
 

@@ -35,8 +35,7 @@ def rig(model: Model, rig_file: Path, out: Path | None = None, format_: str = ""
 
     Without --out the rig file is only checked.
     """
-    from trunnion.rig.virtual.observation import check_folder, check_form
-    from trunnion.rig.virtual.observe import observe
+    from trunnion.rig.virtual.observe import check_folder, check_form, observe
     from trunnion.rig.virtual.rig_file import Rig, placed_in_rig
 
     if format_:
@@ -56,7 +55,7 @@ def rig(model: Model, rig_file: Path, out: Path | None = None, format_: str = ""
     conditions = counted(len(observation.cases), "condition")
     line(rig_model.name or "Test rig", "bold")
     line(f"{mechanism.name or 'no name'}; {conditions} of {counted(rig_model.schedule.turns, 'cycle')}; "
-         f"{observation.rate:g} samples a second; {counted(observation.rows, 'row')}")  # fmt: skip
+         f"{rig_model.rate.value:g} samples a second; {counted(observation.rows, 'row')}")  # fmt: skip
     if out:
         with bar("files", len(observation.cases), least=FEWEST) as progress:
             names = observation.write(out, format_, progress)

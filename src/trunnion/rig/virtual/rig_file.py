@@ -34,8 +34,8 @@ from trunnion.rig.reading import units
 from trunnion.rig.reading.mapping import Accuracies, Pulses
 
 __all__ = [
-    "FORMATS", "Encoder", "Rig", "Schedule", "Sensor", "SensorChannel", "SensorErrors", "Value", "converted", "draw",
-    "placed_in_rig", "pulsed", "pulses", "readings", "resolved", "smoothed", "stream",
+    "FORMATS", "Encoder", "Rig", "Schedule", "Sensor", "SensorChannel", "SensorErrors", "Value", "draw",
+    "placed_in_rig", "pulsed", "readings", "resolved", "smoothed", "stream",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -257,15 +257,11 @@ class SensorChannel:
         return self.at_rest and not self.sensor.per_turn
 
     @property
-    def limit(self) -> float:
-        """Largest magnitude that it can tell."""
-        return min(self.range, self.span)
-
-    @property
     def decimals(self) -> int:
         """Of a reading in its unit, so that what is left out is nothing beside step and noise."""
         least = min((item for item in (self.step, self.noise) if item > 0), default=0.0) * abs(self.per) * FINE
-        step = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
+        limit = min(self.range, self.span)
+        step = limit * abs(self.per) * 1e-9 if math.isfinite(limit) else 1e-9
         return int(np.clip(-math.floor(math.log10(least or step)), 0, 15))
 
 
@@ -394,18 +390,9 @@ def readings(
         value += channel.drift / rate * np.arange(len(value))
     if noise is not None and channel.noise:
         value += channel.noise * noise
-    return converted(channel, value)
-
-
-def converted(channel: SensorChannel, value: Array) -> Array:
-    """Clipped, in steps, in the unit of the reading, with the decimals that a file has."""
+    # clipped, in steps, in the unit of the reading, with the decimals that a file has
     value, step = np.clip(value, -channel.range, channel.range), channel.step
     if step:  # the upper end of a converter is one step short
         sense = math.copysign(1.0, channel.per)
         value = sense * np.clip(np.rint(sense * value / step) * step, -channel.span, channel.span - step)
     return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
-
-
-def pulses(angle: Array, per_turn: int) -> NDArray[np.int64]:
-    """Running count of an encoder at the coordinates (rad) of the driver."""
-    return np.floor(angle * (per_turn / (2 * np.pi)) + 1e-9).astype(np.int64)

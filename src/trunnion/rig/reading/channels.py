@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import comb
 
@@ -16,7 +16,7 @@ from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.measurement import Signal
 from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.turns import Say, Timeline, Turns, counted, lost, note, runs, turn_means, unit_of, warning
-from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
+from trunnion.rig.reading.units import SensorScale, alike, default_unit
 
 __all__ = [
     "LOOKED_AT", "WIDTH", "Sensor", "drift", "faults", "filtered", "mean_uncertainty", "missing", "noise_of",
@@ -47,43 +47,22 @@ class Sensor:
     """The sensor of a channel in one file: what its readings are, and what is uncertain in them.
 
     unit: of the readings; step, zero, zero_uncertainty: in readings; since: when the zero was read, s, NaN of one that
-    is stated; accuracy: of the zero, SI.
+    is stated; datum: what is measured where the sensor reads 0, if a zero is stated in the unit of the quantity; else
+    0: a zero in other units, as 4 mA, is what the sensor gives of nothing.
     """
 
     channel: Channel
     scale: SensorScale
     unit: str
     step: float
-    accuracy: float
-    zero: float = 0.0
-    zero_uncertainty: float = 0.0
-    since: float = float("nan")
-
-    @property
-    def size(self) -> float:
-        """What a step of 1 in the readings is, SI."""
-        return abs(self.scale.factor)
+    zero: float
+    zero_uncertainty: float
+    since: float
+    datum: float
 
     def quantity(self, readings: Array) -> Array:
         """What the readings measure, SI."""
         return self.channel.sign * self.scale.factor * (readings - self.zero)
-
-    @property
-    def datum(self) -> float:
-        """What is measured where the sensor reads 0, if a zero is stated in the unit of the quantity; else 0.
-
-        A zero in other units, as 4 mA, is what the sensor gives of nothing.
-        """
-        zero, scale = self.channel.zero, self.scale
-        of_quantity = isinstance(zero, Amount) and not zero.plain and not alike(zero.dimensions, scale.of_reading)
-        if of_quantity or (isinstance(zero, Amount) and scale.direct):
-            return -self.zero * self.channel.sign * scale.factor
-        return 0.0
-
-    @property
-    def read_in(self) -> tuple[str, float]:
-        """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
-        return (self.unit, self.scale.raw) if self.unit and self.scale.direct else ("", 1.0)
 
 
 def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: Timeline, say: Say) -> Sensor:
@@ -91,7 +70,7 @@ def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: 
 
     values: readings, (row,). What is no number or at the end of the range becomes NaN in them.
     """
-    where = f"channels.{name}"
+    where, zero = f"channels.{name}", channel.zero
     usual = default_unit(channel.measures) if channel.gain is None or channel.gain.plain else ""
     unit, _ = unit_of(where, channel.column, column, channel.unit, usual, say)
     if not channel.unit and column.unit:
@@ -105,36 +84,43 @@ def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: 
         raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain"))
     say(missing(where, column, values, line.seconds))
     if channel.range is not None:
-        say(_clipped(where, values, scale.reading(channel.range, "range"), unit, line.seconds))
+        limit = scale.reading(channel.range, "range")
+        rows, readings = np.abs(values) >= CLIP * limit, int(np.count_nonzero(np.isfinite(values)))
+        if count := int(np.count_nonzero(rows)):
+            what = lost(f"clipped at the end of the range of {limit:.6g} {unit} or beyond", rows, line.seconds)
+            remedy = "use a larger range or a smaller load, or correct column, unit, gain and range in the mapping"
+            finding = warning("readings.clipped", where, what, remedy)
+            finding = replace(finding, figures={"count": count, "readings": readings})
+            if count > MOST * readings:  # the rest says nothing of the channel
+                raise MechanismError(replace(finding, severity=Severity.ERROR))
+            values[rows] = np.nan
+            say(finding)
     step = scale.reading(channel.resolution, "resolution") if channel.resolution else 0.0
-    accuracy = abs(scale.factor) * scale.reading(channel.accuracy.zero, "accuracy.zero")
-    if isinstance(channel.zero, Zero):
-        zero = _unloaded(name, channel.zero.over, values, line, say)
-    else:
-        zero = scale.reading(channel.zero, "zero"), 0.0, float("nan")
-    return Sensor(channel, scale, unit, step, accuracy, *zero)
+    if isinstance(zero, Zero):
+        say(f"zero of {name}: mean over the unloaded stretch")
+        return Sensor(channel, scale, unit, step, *_unloaded(where, zero, values, line, say), 0.0)
+    reading = scale.reading(zero, "zero")
+    of_quantity = scale.direct or not (zero.plain or alike(zero.dimensions, scale.of_reading))
+    datum = -reading * channel.sign * scale.factor if of_quantity else 0.0
+    return Sensor(channel, scale, unit, step, reading, 0.0, np.nan, datum)
 
 
-def _unloaded(
-    name: str, spans: Sequence[tuple[Amount, Amount]], values: Array, line: Timeline, say: Say
-) -> tuple[float, float, float]:
+def _unloaded(where: str, zero: Zero, values: Array, line: Timeline, say: Say) -> tuple[float, float, float]:
     """The mean over unloaded stretches, its uncertainty, by how they differ too, and the mean of their time."""
-    where, times, parts = f"channels.{name}.zero", [], []
-    for begin, end in spans:
+    times, parts = [], []
+    for begin, end in zero.over:
         rows = slice(*np.searchsorted(line.seconds, (begin.value, end.value)))
-        finite = np.isfinite(values[rows])
-        part, when = values[rows][finite], line.seconds[rows][finite]
-        if not part.size:
+        far = spikes(values[rows])
+        good = np.isfinite(values[rows]) & ~far
+        if not good.any():
             what = f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from "
             what += f"{line.seconds[0]:g} to {line.seconds[-1]:g} s"
             remedy = "state a stretch in which the sensor is not loaded"
-            raise MechanismError(Finding(what, where, remedy, code="data.zero.no_readings"))
-        far = spikes(part)
+            raise MechanismError(Finding(what, f"{where}.zero", remedy, code="data.zero.no_readings"))
         if far.any():
-            say(warning("readings.spikes", where, lost("spikes", far, when), "check shielding"))
-        times.append(when[~far])
-        parts.append(part[~far])
-    say(f"zero of {name}: mean over the unloaded stretch")
+            say(warning("readings.spikes", f"{where}.zero", lost("spikes", far, line.seconds[rows]), "check shielding"))
+        times.append(line.seconds[rows][good])
+        parts.append(values[rows][good])
     means = [float(np.mean(part)) for part in parts]
     within = mean_uncertainty(np.concatenate([part - mean for part, mean in zip(parts, means, strict=True)]))
     error = float(np.hypot(within, np.ptp(means) / 12**0.5))  # between them rectangular, GUM 4.3.7
@@ -238,20 +224,6 @@ def missing(where: str, column: Column, readings: Array, seconds: Array) -> Find
     return warning("readings.missing", where, what, "check sensor, cable and logger") if mask.any() else None
 
 
-def _clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:
-    """Readings at the end of the range or beyond, which become NaN; MechanismError where most of the channel is."""
-    rows = np.abs(readings) >= CLIP * limit
-    figures = {"count": int(np.count_nonzero(rows)), "readings": int(np.count_nonzero(np.isfinite(readings)))}
-    gross = figures["count"] > MOST * figures["readings"]  # the rest says nothing of the channel
-    what = lost(f"clipped at the end of the range of {limit:.6g} {unit} or beyond", rows, seconds)
-    remedy = "use a larger range or a smaller load, or correct column, unit, gain and range in the mapping"
-    finding = replace(warning("readings.clipped", where, what, remedy), figures=figures)
-    if gross:
-        raise MechanismError(replace(finding, severity=Severity.ERROR))
-    readings[rows] = np.nan
-    return finding if rows.any() else None
-
-
 def faults(where: str, readings: Array, turns: Turns, near: slice, moves: bool) -> Iterator[Finding]:
     """Stuck readings and spikes while the drive runs, which become NaN; what half of the turns have is the signal's.
 
@@ -284,15 +256,15 @@ def faults(where: str, readings: Array, turns: Turns, near: slice, moves: bool) 
 
 def _stuck(part: Array) -> Mask:
     """The same reading in a row ten times as long as nearly all others stay; none where that is most of it."""
-    starts, lengths = runs(np.concatenate([np.diff(part) == 0, [False]]))
-    stuck = np.zeros(part.size, dtype=np.bool_)
-    single = part.size - int(np.sum(lengths + 1))
-    stays = np.sort(np.concatenate([lengths + 1, np.ones(min(single, 10 * lengths.size), dtype=np.intp)]))
-    usual = float(stays[int(0.99 * (stays.size - 1))]) if stays.size else 0.0
-    long = lengths + 1 > max(STUCK, 10 * usual if usual < 0.1 * part.size else STUCK)
-    for begin, length in zip(starts[long], lengths[long], strict=True):
-        stuck[begin + 1 : begin + length + 1] = True
-    return stuck if stuck.sum() <= 0.5 * part.size else np.zeros_like(stuck)
+    ends = np.flatnonzero(np.append(np.diff(part) != 0, True))
+    stays = np.diff(ends, prepend=-1)
+    single = np.flatnonzero(stays == 1)  # of which no more count than ten for each that stays
+    sizes = np.sort(np.delete(stays, single[10 * (stays.size - single.size) :]))
+    usual = sizes[int(0.99 * (sizes.size - 1))] if sizes.size else 0
+    long = stays > max(STUCK, 10 * usual if usual < 0.1 * part.size else STUCK)
+    stuck = np.repeat(long, stays)
+    stuck[ends[long] - stays[long] + 1] = False  # the first of them is one
+    return stuck & (np.mean(stuck) <= 0.5)
 
 
 def spikes(part: Array) -> Mask:

@@ -352,11 +352,11 @@ class Observation:
                     WRITERS[form](record, self.units, Path(new) / names[-1])
                     if progress:
                         progress(done)
-                yaml = YAML(typ="safe", pure=True)
-                yaml.allow_unicode, yaml.width = True, 118
-                yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
                 for name, entries in ((MAPPING, self.mapping(form)), (TRUTH, self.truth())):
                     names.append(name)
+                    yaml = YAML(typ="safe", pure=True)
+                    yaml.allow_unicode, yaml.width = True, 118
+                    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
                     yaml.default_flow_style = None if name == MAPPING else False  # the innermost groups on one line
                     with (Path(new) / name).open("w", encoding="utf-8", newline="\n") as stream:
                         stream.write(HEADS[name])

@@ -14,8 +14,7 @@ import trunnion
 from measured_data.recording import IDLE, RPM, ZERO, Columns, codes, mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError
 from trunnion.rig.modelled import in_condition
-from trunnion.rig.reading.channels import resolution
-from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.read import read_measured, resolution
 
 OMEGA = RPM * np.pi / 30
 

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.rig.reading.channels import missing
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import DataTable
-from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, unit_of, warning
+from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, missing, unit_of, warning
 
 __all__ = ["Coordinate", "Pulses", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 

@@ -28,7 +28,7 @@ from trunnion.rig.reading.units import HERTZ, alike, dimensions
 
 __all__ = [
     "DENSE", "GAP", "TURN", "LeftOfSteps", "Say", "Timeline", "Turns", "at_times", "counted", "covariance_of_steps",
-    "cut", "gathered", "in_step", "joined", "left_in_turns", "left_of_steps", "lost", "noise_before", "note",
+    "cut", "gathered", "in_step", "joined", "left_in_turns", "left_of_steps", "lost", "missing", "noise_before", "note",
     "resampled", "runs", "time_mean", "timeline", "turn_means", "unit_of", "warning",
 ]  # fmt: skip
 
@@ -204,6 +204,15 @@ def lost(kind: str, mask: NDArray[np.bool_], time: NDArray[np.float64], noun: st
     """Rows of a mask in words: what they are, how many, when the stretches of them begin; they are left out."""
     count = f"{kind}: {counted(int(mask.sum()), noun)} of {mask.size:,}"
     return f"{count}, {at_times(time[runs(mask)[0]])}; left out"
+
+
+def missing(where: str, column: Column, readings: Array, seconds: Array) -> Finding | None:
+    """Cells without a number, which all become NaN: infinite ones too."""
+    readings[np.isinf(readings)] = np.nan
+    mask = np.isnan(readings)
+    example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
+    what = lost(f"dropouts{example}", mask, seconds, "cell")
+    return warning("readings.missing", where, what, "check sensor, cable and logger") if mask.any() else None
 
 
 # ---- turns ----------------------------------------------------------------------------------------------------

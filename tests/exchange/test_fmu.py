@@ -53,8 +53,8 @@ def four_bar(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
 @pytest.fixture(scope="module")
 def unit(four_bar: Mechanism, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The class that runs in the unit, over a folder with the model."""
-    from trunnion.exchange.fmu_slave import MODEL as NAME
-    from trunnion.exchange.fmu_slave import Linkage
+    from trunnion.exchange.fmu import MODEL as NAME
+    from trunnion.exchange.fmu import Linkage
 
     folder = tmp_path_factory.mktemp("unit")
     four_bar.write(folder / NAME)
@@ -149,7 +149,7 @@ def test_loads_and_parameters_are_taken_over(unit: Any, four_bar: Mechanism) -> 
 
 
 def test_it_asks_for_the_end_where_the_motion_ends(unit: Any, four_bar: Mechanism, tmp_path: Path) -> None:
-    from trunnion.exchange.fmu_slave import Linkage
+    from trunnion.exchange.fmu import Linkage
 
     data = four_bar.data()
     data["drivers"]["O"]["range"] = ["0 deg", "90 deg"]

@@ -159,22 +159,22 @@ def test_newer_links_have_a_digest_corrections_and_one_joint_for_a_slider(tmp_pa
     assert draft.bodies["C block"].mass == 0.5
     assert draft.drives == {"A": pytest.approx(-1.5 * 2 * math.pi / 60)}
     assert np.all(analyse(model(draft, tmp_path), 36)["status"].values == 0)
-    with pytest.raises(MechanismError, match="a record of it cannot be read"):
+    with pytest.raises(MechanismError, match="is damaged"):
         import_file(SITE + check(text).replace("7q", "7r"))
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (SITE + PMKS["four-bar"][:-1] + "w", "a record of it cannot be read"),  # its length does not fit
-        (SITE + PMKS["four-bar"].replace("0mv", "0m!"), "a record of it cannot be read"),
+        (SITE + PMKS["four-bar"][:-1] + "w", "is damaged"),  # its length does not fit
+        (SITE + PMKS["four-bar"].replace("0mv", "0m!"), "is damaged"),
         (SITE + "pmks2:0123abcd.eyJ9", "newest format"),
         (SITE + "j=A,0,0&l=AB", "no link of PMKS"),
         ("https://example.org/", "no link of PMKS"),
         (SITE + "x" * 2_000_000, "at most 1,000,000"),
         (SITE + check(PMKS["four-bar"][:-1].replace("..YRAB", ".GE,E,0,0,0" * 3000 + "..YRAB")), "at most 2,000"),
-        (SITE + check(PMKS["four-bar"][:-1].replace("A,B,,", "A,Q,,")), "a record of it cannot be read"),
-        (SITE + check(PMKS["four-bar"][:-1].replace("KD,D", "KC,D")), "a record of it cannot be read"),
+        (SITE + check(PMKS["four-bar"][:-1].replace("A,B,,", "A,Q,,")), "is damaged"),
+        (SITE + check(PMKS["four-bar"][:-1].replace("KD,D", "KC,D")), "is damaged"),
     ],
 )
 def test_bad_links_are_refused_in_a_sentence(text: str, says: str) -> None:

@@ -36,7 +36,7 @@ DEEPEST, FARTHEST = 12, 1e6  # blocks in blocks; m from the origin
 TOUCH = 1e-5  # of the drawing: what lies nearer is in one place; rad, what differs less is parallel
 UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}  # m, by $INSUNITS
 HALF = 1e-3  # rad, by which a half circle may differ from one
-NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
+NEAR = 0.05  # of the drawing: within it a text names what it lies at
 Text = tuple[str, Array, str]  # layer, place and words
 
 
@@ -70,11 +70,6 @@ class Slot(Line):
         off = at - self.start
         along, aside = off @ self.span / self.length, abs(_cross(self.span, off)) / self.length
         return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
-
-    def completes(self, other: Slot) -> bool:
-        """Whether two half circles run between the same ends, the other way."""
-        apart = np.linalg.norm(self.start - other.end) + np.linalg.norm(self.end - other.start)
-        return bool(apart < HALF * other.half and abs(self.half - other.half) < HALF * other.half)
 
 
 def read(path: Path, options: ImportOptions) -> Draft:
@@ -111,11 +106,11 @@ def read(path: Path, options: ImportOptions) -> Draft:
         raise refused(what, remedy="draw each link on a layer of its own: its pins as circles, lines between them")
     for kind, number in sketch.left.most_common(6):
         draft.lose(f"{number} {kind}")
+    draft.lose("masses, which a DXF does not hold")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
         draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
     _Reader(sketch, draft, options, size).read()
-    draft.lose("masses, which a DXF does not hold")
     return draft
 
 
@@ -151,14 +146,6 @@ class Sketch:
                 if key not in names:
                     names[key] = free_name(layer, names.values())
                 self._add(names[key], entity)
-        halves, self.halves = self.halves, []
-        for slot in halves:  # two half arcs about one centre, which is how some programs draw a circle, are a circle
-            other = next((half for half in self.halves if half.layer == slot.layer and half.completes(slot)), None)
-            if other is None:
-                self.halves.append(slot)
-            else:
-                self.halves.remove(other)
-                self.circles.append((slot.layer, (slot.start + slot.end) / 2, slot.half))
 
     def _entities(self, entities: Iterable[Any], inserted: str, depth: int) -> Iterator[tuple[str, Any]]:
         """Lines, arcs, circles, points and texts with their layers, blocks and polylines taken apart.
@@ -192,7 +179,7 @@ class Sketch:
             self.heights.append(self.unit * point.z)
             return self.unit * np.array([point.x, point.y])
 
-        if kind in ("CIRCLE", "ARC", "ELLIPSE") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
+        if kind in ("CIRCLE", "ARC") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
             kind = f"tilted {kind}"
         sweep = dxf.end_angle - dxf.start_angle if kind == "ARC" else 0.0
         if kind == "LINE":
@@ -203,10 +190,6 @@ class Sketch:
             self.circles.append((layer, place(dxf.location), 0.0))
         elif kind == "ARC" and abs(sweep % 360 - 180) < math.degrees(HALF):
             self.halves.append(Slot(layer, place(entity.start_point), place(entity.end_point), self.unit * dxf.radius))
-        elif (
-            kind == "ELLIPSE" and abs(dxf.ratio - 1) < TOUCH and abs(dxf.end_param - dxf.start_param - math.tau) < HALF
-        ):
-            self.circles.append((layer, place(dxf.center), self.unit * dxf.major_axis.magnitude))  # of a scaled block
         elif kind in ("TEXT", "ATTRIB"):
             self.texts.append((layer, place(entity.get_placement()[1]), entity.plain_text()))
         elif kind == "MTEXT" and "\n" not in entity.plain_text().strip():
@@ -246,6 +229,8 @@ class _Reader:
         self.drawn = list(self.marks)
         self.ends = {line: (self._place(line.start), self._place(line.end)) for line in sketch.lines}
         self.slots, sides = self._slots()
+        if loose := len(sketch.halves) - 2 * len(self.slots):
+            draft.lose(f"{loose} half circles")
         for line in sketch.lines:
             for number in () if line in sides else self.ends[line]:
                 self.marks.setdefault(number, {}).setdefault(line.layer, [])
@@ -422,17 +407,22 @@ class _Reader:
         for link, body in draft.bodies.items():
             targets += [(link, name, (link, link), at) for name, at in body.points.items()]
             body.points = {}
-        choices, texts = list[tuple[float, int, int, Text]](), dict[int, Text]()
-        places = np.array([at[:2] for *_, at in targets]).reshape(-1, 2)
-        for text in self.sketch.texts:
-            apart = np.hypot(*(places - text[1]).T)
-            for j in (int(j) for j in np.argsort(apart, kind="stable")[:CROWD] if apart[j] <= near):
-                links = targets[j][2]
-                strange = 0.0 if text[0] == links[-1] else 0.5 if text[0] in links else 1.0
-                choices.append((float(apart[j]) + near * strange, j, len(choices), text))
-        for _, j, _, text in sorted(choices, key=lambda choice: choice[:3]):
-            if j not in texts and not any(text is other for other in texts.values()):
-                texts[j] = text
+        texts: dict[int, Text] = {}
+        words = self.sketch.texts
+        places, written = (
+            np.array(part).reshape(-1, 2) for part in ([t[3][:2] for t in targets], [t[1] for t in words])
+        )
+        apart = np.hypot(*(places[:, None] - written).transpose(2, 0, 1))
+        choices = []
+        for j, i in np.argwhere(apart <= near):
+            layer, links = words[i][0], targets[j][2]
+            strange = 0.0 if layer == links[-1] else 0.5 if layer in links else 1.0
+            choices.append((apart[j, i] + near * strange, j, i))
+        free = set(range(len(words)))
+        for _, j, i in sorted(choices):
+            if j not in texts and i in free:
+                texts[j] = words[i]
+                free.remove(i)
         used: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
         pairs, draft.pairs = draft.pairs, {}
         renamed: dict[str, str] = {}

@@ -19,16 +19,13 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from trunnion.errors import MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
-from trunnion.model.names import nearest
 
 __all__ = ["read", "read_link"]
 
 GROUND = "ground"
 MOST = 2000  # pins and bars of a linkage
 LARGEST = 10_000_000  # bytes of a file
-BROKEN = (KeyError, TypeError, ValueError, AttributeError, IndexError)  # what a damaged record leads to
 
 
 @dataclass
@@ -59,16 +56,8 @@ class PlanarPin:
 def read(path: Path, options: ImportOptions) -> Draft:
     """Read a saved file of PMKS+ or a text with a link to it, or what `mechanism_to_json` of pylinkage has written."""
     few(path.stat().st_size, LARGEST, "bytes")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        if path.suffix.lower() != ".json":
-            return read_link(text, saved=True)
-        data = json.loads(text)
-    except UnicodeDecodeError:
-        raise _no_drawing("it is no text") from None
-    except (ValueError, RecursionError):
-        raise refused("is no JSON that can be read", "", WRITTEN) from None
-    return _of_pylinkage(data, options)
+    text = path.read_text(encoding="utf-8-sig")
+    return _of_pylinkage(json.loads(text), options) if path.suffix.lower() == ".json" else read_link(text, saved=True)
 
 
 def _space(place: Sequence[float]) -> Array:
@@ -123,11 +112,6 @@ FIELDS = {"J": ("x", "y", "angle", "speed", "mass"), "L": ("mass", "inertia", "x
 Record = dict[str, Any]
 
 
-def _no_drawing(what: str) -> MechanismError:
-    remedy = "copy the link again, from Share in PMKS+, or save the drawing there"
-    return refused(f"is no drawing of PMKS+ that can be read: {what}", "", remedy)
-
-
 def read_link(text: str, saved: bool = False) -> Draft:
     """Read a link or its query; nothing is fetched. saved: whether it comes from a file."""
     few(len(text), LONGEST, "signs")
@@ -138,24 +122,19 @@ def read_link(text: str, saved: bool = False) -> Draft:
         raise refused(what, "", "share it from a version that gives links without it")
     query = next((query for query in queries if TEXT.fullmatch(query)), None)
     if query is None:
-        raise _no_drawing("it has no link of PMKS+")
+        raise refused("has no link of PMKS+", "", "copy the link from Share in PMKS+, or save the drawing there")
     draft = Draft("" if saved else "Linkage of PMKS+", {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
     draft.source = "" if saved else "link of PMKS+"
-    try:
-        if re.search(r"\*[0-9A-Za-z]{6}$", query):
-            query, digest = query[:-7], query[-6:]
-            code = 0x811C9DC5
-            for sign in query:
-                code = (code ^ ord(sign)) * 0x01000193 & 0xFFFFFFFF
-            if code != sum(CHECKS.index(sign) * 62**k for k, sign in enumerate(reversed(digest))):
-                raise ValueError
-        if CHECKS[(len(query) - 1) % 62] != query[-1]:
-            raise ValueError
-        return _drawing(query[:-1], draft)
-    except MechanismError:
-        raise
-    except BROKEN:
-        raise _no_drawing("a record of it cannot be read") from None
+    if re.search(r"\*[0-9A-Za-z]{6}$", query):
+        query, digest = query[:-7], query[-6:]
+        code = 0x811C9DC5
+        for sign in query:
+            code = (code ^ ord(sign)) * 0x01000193 & 0xFFFFFFFF
+        if code != sum(CHECKS.index(sign) * 62**k for k, sign in enumerate(reversed(digest))):
+            raise ValueError("the signs at its end are not those of its text")
+    if CHECKS[(len(query) - 1) % 62] != query[-1]:
+        raise ValueError("the sign at its end is not that of its length")
+    return _drawing(query[:-1], draft)
 
 
 def _integer(text: str) -> int:
@@ -203,7 +182,7 @@ def _drawing(text: str, draft: Draft) -> Draft:
     links = {link["id"]: link for link in map(_link, groups[1])}
     strange = any(name not in joints for link in links.values() for name in link["joints"])
     if strange or len(joints) + len(links) < len(groups[0]) + len(groups[1]):
-        raise ValueError  # two records have the same name, or a link names a joint that there is not
+        raise ValueError("two records have the same name, or a link names a joint that there is not")
     for entry in (entry for entry in extras if entry[0] == "P"):
         name, number, value = entry[1:].split("~")
         if name in ("D", "I"):
@@ -270,59 +249,34 @@ WRITTEN = "write it with pylinkage.mechanism.mechanism_to_json"
 
 def _of_pylinkage(data: Any, options: ImportOptions) -> Draft:
     """The draft of a mechanism: links name their joints, a tracker is a point of the link that has both its joints."""
-    joints = data.get("joints") if isinstance(data, dict) else None
-    if not isinstance(joints, list) or not all(isinstance(joint, dict) for joint in joints):
-        raise refused("has no joints of pylinkage with places", "", WRITTEN)
+    joints = data["joints"]
     few(len(joints), MOST, "joints")
     draft = Draft(str(data.get("name") or ""), {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
-    unit = draft.assumed_unit(options)
-    try:
-        pins = {joint["id"]: _pin(joint, unit) for joint in joints}
-        if len(pins) < len(joints):
-            raise refused("has two joints of the same name", "", WRITTEN)
-        _connect(data, pins, draft)
-    except MechanismError:
-        raise
-    except BROKEN:
-        raise refused("has a joint or link without what it needs", "", WRITTEN) from None
-    return _meet(draft, list(pins.values()))
-
-
-def _pin(joint: Mapping[str, Any], unit: float) -> PlanarPin:
-    """The pin of a joint, without its bodies; ValueError if its place is no number."""
-    name, place = joint["id"], joint["position"]
-    if any(part is None for part in place):
-        what = f"{name!r} has no place: it has not been worked out yet"
-        raise refused(what, f"joints.{name}", "step the linkage once before it is saved")
-    x, y = (float(part) * unit for part in place)
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise ValueError
-    pin = PlanarPin(str(joint.get("name") or name), (x, y))
-    if joint.get("type") == "prismatic":
-        pin.carrier, pin.direction = GROUND, [float(part) for part in joint["axis"]]
-    return pin
-
-
-def _connect(data: Mapping[str, Any], pins: dict[str, PlanarPin], draft: Draft) -> None:
-    """Add the bodies of the links to the draft and to their pins."""
-
-    def pin_of(name: Any) -> PlanarPin:
-        if name not in pins:
-            raise refused(f"{name!r} is no joint of the file", "joints", nearest(str(name), pins))
-        return pins[name]
-
+    unit, pins = draft.assumed_unit(options), dict[str, PlanarPin]()
+    for joint in joints:
+        name, place = joint["id"], joint["position"]
+        if any(part is None for part in place):
+            what = f"{name!r} has no place: it has not been worked out yet"
+            raise refused(what, f"joints.{name}", "step the linkage once before it is saved")
+        x, y = (float(part) * unit for part in place)
+        pins[name] = PlanarPin(str(joint.get("name") or name), (x, y))
+        if joint.get("type") == "prismatic":
+            pins[name].carrier, pins[name].direction = GROUND, [float(part) for part in joint["axis"]]
+    if len(pins) < len(joints):
+        raise refused("has two joints of the same name", "", WRITTEN)
     for link in data["links"]:
         kind, name = link.get("type", "link"), GROUND
         if kind != "ground" and link["id"] != data.get("ground"):
             name = free_name(str(link.get("name") or link["id"]), draft.bodies)
             draft.bodies[name] = Body(name)
-        for pin in map(pin_of, link["joints"]):
+        for pin in (pins[joint] for joint in link["joints"]):
             pin.bodies += [name] * (name != pin.carrier)  # the frame has the line that a slider is on
         if kind in ("driver", "arc_driver") and link.get("motor_joint"):
-            pin_of(link["motor_joint"]).drive = 0.0
+            pins[link["motor_joint"]].drive = 0.0
     for joint in data["joints"]:
         if joint.get("type") == "ground":
             pins[joint["id"]].bodies.append(GROUND)
     for joint in (joint for joint in data["joints"] if joint.get("type") == "tracker"):
         first, second = (pins[joint[f"ref_joint{number}_id"]].bodies for number in (1, 2))
         pins[joint["id"]].bodies += [name for name in first if name in second][:1]
+    return _meet(draft, list(pins.values()))

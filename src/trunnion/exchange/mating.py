@@ -106,12 +106,6 @@ class Facing:
     gap: float
     corners: Array
 
-    @property
-    def back(self) -> Facing:
-        """The same from the other body."""
-        bodies, outlines = self.bodies[::-1], self.outlines[::-1]
-        return replace(self, bodies=bodies, outlines=outlines, normal=-self.normal, level=-self.level - self.gap)
-
 
 def parallel(left: Array, other: Array) -> bool:
     """Whether two unit vectors are parallel or opposite."""
@@ -147,8 +141,7 @@ def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
     gap : greatest difference of the radii of a pin and its hole, and distance of facing planes, m.
     """
     mechanism = _Contacts(draft, faces, gap)
-    for fixed in mechanism.bolted():
-        mechanism.weld(*fixed)
+    mechanism.bolt()
     while (rigid := next(mechanism.rigid(), None)) is not None:
         mechanism.weld(*rigid)
     mechanism.unconnected()
@@ -260,14 +253,14 @@ class _Contacts:
 
     def __init__(self, draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
         self.draft, self.leader = draft, {name: name for name in draft.bodies}
-        self._ends: dict[tuple[str, str], list[Facing]] = defaultdict(list)
         self.rounds = _rounds(faces, "cylinder")
-        self.facings = list(_facings(faces, gap))
+        self.facings, self.contacts = list(_facings(faces, gap)), list[Contact]()
         self.contacts = self._joining(self.rounds, gap)
         self.balls = self._joining(_rounds(faces, "sphere"), gap)
         axes, slack = [contact.hole.axis for contact in self.contacts], [abs(contact.play) for contact in self.contacts]
         numbers = _line_numbers([contact.middle for contact in self.contacts], axes, slack)
         self.line = dict(zip(self.contacts, numbers, strict=True))  # number of the axis of each contact
+        self.regroup()
         self.plane: Array | None = None  # its normal where it may move in one: two pins along it, others slide in it
         for normal in [] if self.balls else axes:
             along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
@@ -308,29 +301,22 @@ class _Contacts:
         """Numbers of the axes of contacts."""
         return {self.line[contact] for contact in contacts}
 
-    def between(self) -> dict[tuple[str, str], list[Contact]]:
-        """Contacts of pins by the two bodies that they join."""
-        joining: dict[tuple[str, str], list[Contact]] = defaultdict(list)
+    def regroup(self) -> None:
+        """Sort contacts of pins, and planes that face each other, by the bodies that move together."""
+        self.between: dict[tuple[str, str], list[Contact]] = defaultdict(list)
         for contact in self.contacts:
             left, other = sorted((self.leader[contact.hole.body], self.leader[contact.pin.body]))
             if left != other:
-                joining[left, other].append(contact)
-        return joining
-
-    def ends(self, left: str, other: str) -> list[Facing]:
-        """Facing planes of two bodies, seen from the first."""
-        self.facing_pairs()
-        return self._ends.get((left, other), [])
-
-    def facing_pairs(self) -> list[tuple[str, str]]:
-        """Bodies with planes that face each other."""
-        if not self._ends:
-            for facing in self.facings:
-                first, second = (self.leader[name] for name in facing.bodies)
-                if first != second:
-                    self._ends[first, second].append(facing)
-                    self._ends[second, first].append(facing.back)
-        return [pair for pair in self._ends if pair[0] < pair[1]]
+                self.between[left, other].append(contact)
+        self.ends: dict[tuple[str, str], list[Facing]] = defaultdict(list)  # seen from the first body
+        for facing in self.facings:
+            first, second = (self.leader[name] for name in facing.bodies)
+            if first < second:
+                self.ends[first, second].append(facing)
+            elif second < first:
+                level = -facing.level - facing.gap
+                back = replace(facing, outlines=facing.outlines[::-1], normal=-facing.normal, level=level)
+                self.ends[second, first].append(back)
 
     def weld(self, left: str, other: str, what: str, remedy: str = "") -> None:
         """Make two bodies one and say so; a doubt if there is a remedy."""
@@ -347,15 +333,16 @@ class _Contacts:
         name = free_name(f"fixed {left} {other}", draft.pairs)
         draft.pairs[name] = Pair(name, "fixed", (first, second), np.zeros(3), comments=[what])
         draft.bodies[other].comments.append(what)
-        self._ends.clear()
+        self.regroup()
 
     def stops(self, left: str, other: str, axis: Array) -> int:
         """In how many of the two directions along an axis end faces hold two bodies."""
-        along = [facing.normal @ axis for facing in self.ends(left, other)]
+        pair = (left, other) if left < other else (other, left)
+        along = [facing.normal @ axis for facing in self.ends.get(pair, [])]
         return int(any(part > 1 - ANGLE for part in along)) + int(any(part < -1 + ANGLE for part in along))
 
-    def bolted(self) -> Iterator[tuple[str, str, str, str]]:
-        """Bodies that touch where two holes of each lie on the same axes, as a sentence and what to do if they move."""
+    def bolt(self) -> None:
+        """Make one of bodies that touch where two holes of each lie on the same axes."""
         holes = [item for item in self.rounds if item.hole and item.covered > COVERED[0]]
         numbers = _line_numbers([hole.point for hole in holes], [hole.axis for hole in holes], [0.0] * len(holes))
         bolts: dict[str, dict[int, Array]] = defaultdict(dict)
@@ -367,16 +354,16 @@ class _Contacts:
             count = sum(parallel(bolts[left][number], facing.normal) for number in shared)
             if count > 1 and self.leader[left] != self.leader[other]:
                 what = f"{left} and {other} touch, and {count} holes of each lie on the same axes: fixed"
-                yield left, other, what, "draw the pins if they move"
+                self.weld(left, other, what, "draw the pins if they move")
 
     def rigid(self) -> Iterator[tuple[str, ...]]:
         """Two bodies that cannot move against each other, why, and what to do if they do; the surest first."""
-        between = self.between()
+        between = self.between
         for (left, other), contacts in between.items():
             axis, parallels = contacts[0].hole.axis, [parallel(contacts[0].hole.axis, c.hole.axis) for c in contacts]
             if len(self.lines(contacts)) > 1 and (self.stops(left, other, axis) or not all(parallels)):
                 yield left, other, f"{left} and {other} are fixed to each other: pins on several axes join them"
-        for left, other in self.facing_pairs():
+        for left, other in self.ends:
             if (left, other) not in between and len(self._walls(left, other)) > 2:
                 what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
                 yield left, other, what, "draw the play if they move"
@@ -389,11 +376,8 @@ class _Contacts:
                 yield left, other, f"{left} and {other} turn about the same axes and are one link"
         for body in (name for name in dict.fromkeys(self.leader.values()) if name in lines and len(between) > 1):
             mine = {pair: contacts for pair, contacts in between.items() if body in pair}
-            if (
-                body == self.draft.ground
-                or len(lines[body]) > 1
-                or not self._centred(body, next(iter(mine.values()))[0])
-            ):
+            centred = self._centred(body, next(iter(mine.values()))[0])
+            if body == self.draft.ground or len(lines[body]) > 1 or not centred:
                 continue
             ball = any(body in (self.leader[item.pin.body], self.leader[item.hole.body]) for item in self.balls)
             others = (other for other in self.leader.values() if other != body)
@@ -414,9 +398,10 @@ class _Contacts:
         return bool(np.linalg.norm(across) <= contact.play + 1e-3 * contact.hole.radius)
 
     def _walls(self, left: str, other: str) -> list[tuple[Facing, Facing]]:
-        """Opposite walls that hold two bodies, for independent directions, seen from the first."""
+        """Opposite walls that hold two bodies, for independent directions, seen from the first by name."""
         walls: list[tuple[Facing, Facing]] = []
-        for front, back in combinations(self.ends(left, other), 2):
+        pair = (left, other) if left < other else (other, left)
+        for front, back in combinations(self.ends.get(pair, []), 2):
             if front.normal @ back.normal < -1 + ANGLE**2:
                 normals = [*(wall[0].normal for wall in walls), front.normal]
                 if np.linalg.matrix_rank(np.array(normals), tol=ANGLE) == len(normals):
@@ -430,7 +415,7 @@ class _Contacts:
         draft = self.draft
         while True:
             near = [(self.leader[i.pin.body], self.leader[i.hole.body]) for i in (*self.contacts, *self.balls)]
-            near += [pair for pair in self.facing_pairs() if self._walls(*pair)]
+            near += [pair for pair in self.ends if self._walls(*pair)]
             groups = components(self.leader.values(), near)
             main = next((group for group in groups if self.leader.get(draft.ground) in group), max(groups, key=len))
             flush = [[self.leader[name] for name in facing.bodies] for facing in self.facings if facing.gap <= NEAR]
@@ -452,14 +437,13 @@ class _Contacts:
         self.contacts = [item for item in self.contacts if {item.pin.body, item.hole.body} <= names]
         self.balls = [item for item in self.balls if {item.pin.body, item.hole.body} <= names]
         self.facings = [facing for facing in self.facings if names >= {*facing.bodies}]
-        self._ends.clear()
+        self.regroup()
 
     # ---- pairs -------------------------------------------------------------------------------------------------
 
     def pairs(self) -> None:
         """Add the pairs of all bodies that touch and move against each other."""
-        between = self.between()
-        for (left, other), contacts in between.items():
+        for (left, other), contacts in self.between.items():
             axis = contacts[0].hole.axis
             stops = self.stops(left, other, axis)
             if len(self.lines(contacts)) > 1:
@@ -475,9 +459,8 @@ class _Contacts:
         for ball in self.balls:
             if self.leader[ball.pin.body] != self.leader[ball.hole.body]:
                 self._add(replace(_pair("spherical", [ball]), at=ball.hole.point, length=None))
-        for left, other in sorted(self.facing_pairs()):
-            walls = self._walls(left, other) if (left, other) not in between else []
-            if walls:
+        for left, other in sorted(self.ends.keys() - self.between.keys()):
+            if walls := self._walls(left, other):
                 self._sliding(left, other, walls)
 
     def _add(self, pair: Pair) -> None:
@@ -531,20 +514,14 @@ def _pair(kind: str, contacts: list[Contact], comment: str = "") -> Pair:
         over = f", over {1e3 * (contact.high - contact.low):.9g} mm" if contact.high > contact.low else ""
         pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")
     if kind in ("revolute", "cylindrical"):
-        pair.comments.append(_nearest_fit(main))
+        size, play = round(2e3 * main.hole.radius, 1) * 1e-3, 2 * main.play
+        try:  # the usual fit whose mean play is nearest to that drawn
+            fits = {name: fit(size, *name.split("/")) for name in FITS}
+            name = min(fits, key=lambda name: abs(fits[name].mean - play))
+            drawn = "no play is drawn" if play == 0 else f"play {1e6 * play:.4g} µm on the diameter"
+            span = f"{1e6 * fits[name].minimum:.4g} to {1e6 * fits[name].maximum:.4g} µm"
+            pair.comments.append(f"{drawn}; nearest usual fit: {1e3 * size:.6g} mm {name}, {span}")
+        except MechanismError:
+            pair.comments.append("no ISO fit for its size")
     pair.comments += [comment] if comment else []
     return pair
-
-
-def _nearest_fit(contact: Contact) -> str:
-    """The usual fit whose mean play is nearest to that drawn, in words."""
-    size = round(2e3 * contact.hole.radius, 1) * 1e-3
-    try:
-        fits = {name: fit(size, *name.split("/")) for name in FITS}
-    except MechanismError:
-        return "no ISO fit for its size"
-    play = 2 * contact.play
-    name = min(fits, key=lambda name: abs(fits[name].mean - play))
-    drawn = "no play is drawn" if play == 0 else f"play {1e6 * play:.4g} µm on the diameter"
-    span = f"{1e6 * fits[name].minimum:.4g} to {1e6 * fits[name].maximum:.4g} µm"
-    return f"{drawn}; nearest usual fit: {1e3 * size:.6g} mm {name}, {span}"

@@ -60,33 +60,30 @@ def read(path: Path, options: ImportOptions) -> Draft:
     for name, vertices, faces in meshes:
         if np.any(faces >= len(vertices)) or np.any(faces < 0):
             raise refused("has a triangle without a corner")
-        body = _weighed(draft, free_name(name, draft.bodies), vertices, faces, options.density)
+        body = Body(free_name(name, draft.bodies))
         draft.bodies[body.name] = body
+        mesh = trimesh.Trimesh(vertices, faces, process=True)
+        if not np.isfinite(mesh.vertices).all():
+            raise refused("has corners that are no numbers")
+        shells = f" in {mesh.body_count} shells" if mesh.body_count > 1 else ""
+        size = ", ".join(f"{1e3 * extent:.6g}" for extent in mesh.extents) if len(mesh.faces) else 0
+        body.comments.append(f"a mesh of {len(mesh.faces):,} triangles{shells}, {size} mm large")
+        mesh.density = options.density
+        with np.errstate(all="ignore"):  # of a sheet, which has no volume
+            properties = mesh.mass_properties
+        sign = -1.0 if properties.volume < 0 else 1.0  # inside out throughout
+        if mesh.is_watertight and mesh.is_winding_consistent and sign * properties.volume > 0:
+            body.mass, body.centre = float(sign * properties.mass), np.array(properties.center_mass)
+            body.inertia = sign * np.array(properties.inertia)
+            density = f"{options.density:g} kg/m³"
+            body.comments.append(f"mass by a density of {density}; a mesh cuts the corners of curved faces")
+        else:
+            what = "is not closed, encloses no volume, or its triangles do not all face outwards; it has no mass here"
+            draft.warn(
+                "exchange.open_mesh", f"links.{body.name}", what, "mend the mesh, or state mass, centre and inertia"
+            )
     draft.lose("joints, which a mesh does not hold")
     return draft
-
-
-def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: float) -> Body:
-    """A body with the mass of a closed mesh; one that is open has none, and says so."""
-    body, mesh = Body(name), trimesh.Trimesh(vertices, faces, process=True)
-    if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
-        draft.warn("exchange.mesh", f"links.{name}", "has no triangles, or corners that are no numbers")
-        return body
-    size = ", ".join(f"{1e3 * extent:.6g}" for extent in mesh.extents)
-    shells = f" in {mesh.body_count} shells" if mesh.body_count > 1 else ""
-    body.comments.append(f"a mesh of {len(mesh.faces):,} triangles{shells}, {size} mm large")
-    mesh.density = density
-    with np.errstate(all="ignore"):  # of a sheet, which has no volume
-        properties = mesh.mass_properties
-    sign = -1.0 if properties.volume < 0 else 1.0  # inside out throughout
-    if not (mesh.is_watertight and mesh.is_winding_consistent and sign * properties.volume > 0):
-        what = "is not closed, encloses no volume, or its triangles do not all face outwards; it has no mass here"
-        draft.warn("exchange.open_mesh", f"links.{name}", what, "mend the mesh, or state mass, centre and inertia")
-        return body
-    body.mass, body.centre = float(sign * properties.mass), np.array(properties.center_mass)
-    body.inertia = sign * np.array(properties.inertia)
-    body.comments.append(f"mass by a density of {density:g} kg/m³; a mesh cuts the corners of curved faces")
-    return body
 
 
 # ---- 3MF ----------------------------------------------------------------------------------------------------------

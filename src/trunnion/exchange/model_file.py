@@ -21,8 +21,7 @@ FIXED = ("ground", "frame", "base", "housing", "world", "gestell", "rahmen", "bÃ
 TINY = 1e-12  # of the size of the mechanism: below it a coordinate is rounding
 USUAL = {True: 2 * math.pi, False: 0.1}  # speeds of joints that turn and slide, rad/s and m/s
 STROKE = 0.1  # of the size, of a driven slide whose file states no limits
-IN_PLANE = {"revolute", "prismatic"}
-RELEASED = {"cylindrical": "revolute", "spherical": "revolute", "planar": ""}  # what a pair is in a plane
+RELEASED = {"cylindrical": "revolute", "spherical": "revolute"}  # what a pair is in a plane
 
 
 def complete(
@@ -79,8 +78,19 @@ def model_text(draft: Draft) -> str:
     global frame, in a plane that of the plane through the first joint, so the mechanism starts as it is drawn.
     """
     normal = draft.plane_normal()
-    if normal is not None:
-        draft = _laid_flat(draft, normal)
+    if normal is not None:  # turned so that z is the normal of its plane; pairs become what a plane allows
+        draft = moved(draft, flat_frame(normal), np.zeros(3))
+        for name, pair in list(draft.pairs.items()):
+            if pair.type == "revolute":
+                if pair.axis[2] < 0 and name in draft.drives:
+                    draft.drives = {**draft.drives, name: -draft.drives[name]}
+                draft.pairs[name] = replace(pair, axis=pair.axis * np.sign(pair.axis[2]))
+            elif RELEASED.get(pair.type):
+                comment = f"{pair.type} in the file; in a plane it only turns"
+                draft.pairs[name] = replace(pair, type=RELEASED[pair.type], comments=[*pair.comments, comment])
+            elif pair.type != "prismatic":
+                del draft.pairs[name]
+                draft.note("exchange.flat", f"joints.{name}", f"is {pair.type}, which constrains nothing in a plane")
     return "\n".join(_Writer(draft, spatial=normal is None).lines()) + "\n"
 
 
@@ -91,24 +101,6 @@ def flat_frame(normal: Array) -> Array:
     x = across - (across @ normal) * normal
     x /= np.linalg.norm(x)
     return np.array([x, np.cross(normal, x), normal])
-
-
-def _laid_flat(draft: Draft, normal: Array) -> Draft:
-    """The draft turned so that z is the normal of its plane; pairs that only a plane allows become those it has."""
-    turned = moved(draft, flat_frame(normal), np.zeros(3))
-    pairs = {}
-    for name, pair in turned.pairs.items():
-        if pair.type in IN_PLANE:
-            pairs[name] = replace(pair, axis=pair.axis * (1.0 if pair.type == "prismatic" else np.sign(pair.axis[2])))
-            if pair.type == "revolute" and pair.axis[2] < 0 and name in turned.drives:
-                turned.drives = {**turned.drives, name: -turned.drives[name]}
-        elif RELEASED.get(pair.type):
-            comment = f"{pair.type} in the file; in a plane it only turns"
-            pairs[name] = replace(pair, type=RELEASED[pair.type], comments=[*pair.comments, comment])
-        else:
-            turned.note("exchange.flat", f"joints.{name}", f"is {pair.type}, which constrains nothing in a plane", "")
-    turned.pairs = pairs
-    return turned
 
 
 class _Writer:

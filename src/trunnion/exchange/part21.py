@@ -16,7 +16,6 @@ from trunnion.exchange.draft import few, refused
 __all__ = ["Entity", "Part21", "Ref", "quoted"]
 
 LARGEST = 400_000  # entities of a file that is read; an assembly of a hundred parts has about half of it
-DEEPEST = 100  # lists in lists
 
 _START = re.compile(r"#(\d+)\s*+=\s*+")
 # text, comments and what stands between them, up to the semicolon; nothing is tried twice
@@ -132,8 +131,6 @@ class Part21:
                     stack[-1].append(None)
             else:
                 stack[-1].append(_value(name, value))
-            if len(stack) > DEEPEST:
-                raise refused(f"has more than {DEEPEST} brackets in one another at #{number}")
         records = values[0] if len(values) == 1 and isinstance(values[0], list) else values
         if len(stack) > 1 or not all(isinstance(record, tuple) for record in records):
             raise refused(f"cannot be read at #{number}: its brackets do not match")

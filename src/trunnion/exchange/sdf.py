@@ -239,9 +239,6 @@ def _pose(pose: Element | None, name: str) -> Place:
     if pose is None or not (pose.text or "").strip():
         return Place()
     where = f"pose of {name}"
-    if pose.get("rotation_format") == "quat_xyzw":
-        values = numbers(pose.text, where, 7)
-        return Place(Rotation.from_quat(unit(values[3:], where)).as_matrix(), values[:3])
     values = numbers(pose.text, where, 6)
     turns = Rotation.from_euler("xyz", values[3:], degrees=pose.get("degrees") in YES)
     return Place(turns.as_matrix(), values[:3])

@@ -45,9 +45,6 @@ class Positions:
     rotations: dict[str, Array]
     origins: dict[str, Array]
 
-    def __len__(self) -> int:
-        return int(self.result.sizes["position"])
-
     def draft(self, row: int = 0) -> Draft:
         """The bodies and pairs at a position.
 

@@ -1,7 +1,5 @@
 """What `trunnion.analyse` returns of positions alone, as means over the cycle ask for most; and whether it is right."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

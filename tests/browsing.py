@@ -1,7 +1,5 @@
 """Somebody in front of the studio's page, in a real browser where there is one."""
 
-from __future__ import annotations
-
 import re
 import shutil
 

@@ -1,7 +1,5 @@
 """Shared set-up; its presence puts this folder on the path, so that tests may import `mechanisms` and `reference`."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

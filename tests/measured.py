@@ -1,7 +1,5 @@
 """Figures of measures of a mechanism and of others like it, for the tests of measures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,8 +8,6 @@ from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-
-__all__ = ["figures", "many", "reads"]
 
 
 def many(run: Run, measures: Sequence[Measure]) -> Many:

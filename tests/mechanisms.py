@@ -1,7 +1,5 @@
 """Mechanisms that many tests share, as plain data, and what is asked of their results again and again."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What the mechanisms of the tests are written with: joints, slides and links as plain data."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -4,8 +4,6 @@ A random one is drawn assembled: links and joints lie anywhere, and each joint's
 of its pair takes it. So every kind of pair can stand anywhere in a chain.
 """
 
-from __future__ import annotations
-
 import copy
 import functools
 from collections.abc import Callable
@@ -16,11 +14,6 @@ from scipy import optimize
 
 from mechanisms_parts import joined
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, element, point, rotation, unrolled
-
-__all__ = [
-    "MODELS", "NAMES", "Drawn", "cardan", "chain", "closed", "draw", "floating", "frame_of", "random_rotation", "rssr",
-    "with_friction",
-]  # fmt: skip
 
 REACH = 0.15  # of the drawn drivers on both sides of the drawn pose, rad or m/10
 SPEED = 3.0

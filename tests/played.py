@@ -1,7 +1,5 @@
 """Mechanisms with play in their joints, and what an offset of a pin really does, for the tests of `play`."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,11 +25,6 @@ from trunnion.solve.gears import gears_of
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.system import System, Values
-
-__all__ = [
-    "by_duals", "by_virtual_load", "changes", "four_bar", "measures_of", "offsets_of", "plays", "pressed_to",
-    "rssr", "with_play",
-]  # fmt: skip
 
 Loads = dict[str, list[Vector]]  # load at each end, by joint
 FROM_60 = {"A": {"speed": 1.0, "start": np.radians(60)}}

@@ -1,7 +1,5 @@
 """Mechanisms with joints in play, shared by tests and benchmarks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

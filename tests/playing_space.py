@@ -1,7 +1,5 @@
 """Mechanisms in space with pins in play, and own equations of one; shared by tests."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

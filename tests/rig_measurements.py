@@ -1,7 +1,5 @@
 """Measurements of models as a perfect or a mistaken rig would have them: the model's own courses and noise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Measurements made of a model, with noise and errors of sensors, for the tests of identification."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +14,6 @@ from trunnion.measures.measures import named
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-
-__all__ = ["Sensors", "True_", "truth"]
 
 Array = NDArray[np.float64]
 

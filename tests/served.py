@@ -1,7 +1,5 @@
 """A studio that runs on a folder while something is tried."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Iterator

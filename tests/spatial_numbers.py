@@ -1,15 +1,11 @@
 """Random lines, poses and screws for the tests of spatial algebra, and their parts as arrays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 
 from mechanisms import Array
 from trunnion.algebra.dual import Dual, parts
-
-__all__ = ["apart", "matrix", "random_directions", "random_rotations", "rows", "stacked", "vector"]
 
 
 def vector(a: Array) -> tuple[Any, Any, Any]:
@@ -20,8 +16,7 @@ def vector(a: Array) -> tuple[Any, Any, Any]:
 def stacked(entries: Any) -> Array:
     """An array (…, 3) of three components, one (…, 3, 3) of three rows."""
     if isinstance(entries[0], (tuple, list)):
-        rows = [stacked(row) for row in entries]
-        return np.stack(np.broadcast_arrays(*rows), axis=-2)
+        return np.stack(np.broadcast_arrays(*[stacked(row) for row in entries]), axis=-2)
     return np.stack(np.broadcast_arrays(*(np.asarray(entry, float) for entry in entries)), axis=-1)
 
 

@@ -1,7 +1,5 @@
 """Mechanisms whose motion in time is known: shared by tests and benchmarks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

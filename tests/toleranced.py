@@ -1,7 +1,5 @@
 """Mechanisms with tolerances, the same worked out by closed forms of their own, and samples as a study draws them."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -14,11 +12,6 @@ from trunnion import Mechanism
 from trunnion.studies.tolerance.inputs import inputs_of
 from trunnion.studies.tolerance.linear import ToleranceStudy, study
 from trunnion.studies.tolerance.sampling import Sampler, Sampling
-
-__all__ = [
-    "CLUTCH", "FOURBAR", "RSSR", "SLIDER", "clutch", "clutch_angle", "drawn", "fourbar", "fourbar_angle", "link",
-    "many", "numbers", "rssr", "rssr_angle", "sampler", "slider_crank", "slider_place", "slopes",
-]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -227,8 +220,7 @@ def varied(data: Data, share: float = 1e-3, most: int = 14, seed: int = 3, **opt
         and ".inertia" not in path
         and abs(float(value)) > 1e-9
     ]
-    rng = np.random.default_rng(seed)
-    chosen = [may[i] for i in sorted(rng.permutation(len(may))[:most])]
+    chosen = [may[i] for i in sorted(np.random.default_rng(seed).permutation(len(may))[:most])]
     limits = {path: share * abs(float(known.nominal[path])) for path in chosen}
     return Mechanism(**mechanism.data() | {"tolerances": limits})
 

@@ -1,7 +1,5 @@
 """A job whose answer is easily compared: random numbers counted and summed, block by block."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time
@@ -30,7 +28,7 @@ class ToyJob:
     def identity(self) -> dict[str, Any]:
         return {"seed": self.seed, "blocks": self.blocks, "model": self.model}
 
-    def prepare(self) -> ToyJob:
+    def prepare(self) -> "ToyJob":
         if self.fault == "prepare":
             raise MechanismError(Finding("no such link", "links.x", "name one"))
         if self.fault == "deaf":  # as a process that is terminated before it has begun

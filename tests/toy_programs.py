@@ -1,7 +1,5 @@
 """The toy job in programs of their own, with signals as a terminal sends them."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

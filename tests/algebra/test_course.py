@@ -1,7 +1,5 @@
 """Courses: polynomials between breaks, against closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -83,8 +81,7 @@ def test_an_end_of_what_has_a_value_is_a_break() -> None:
 
 def test_one_state_at_an_instant_is_none() -> None:
     """A node on which it falls is parted from its panel, whose polynomial does not have it."""
-    middle = course(lambda t: t).edges[:2].mean()
-    place = float(middle + TURN / 12 * np.cos(np.pi * 4.5 / 12))
+    place = float(course(lambda t: t).edges[:2].mean() + TURN / 12 * np.cos(np.pi * 4.5 / 12))
 
     def alone(t: Any) -> Any:
         return np.where(np.abs(t - place) < 1e-13, 1, 0)
@@ -147,8 +144,7 @@ def test_passages_dwell_and_rates(level: float) -> None:
     place = np.arccos(level)
     assert found.passages(0, level) == pytest.approx([place, TURN - place], abs=1e-8)
     assert found.passages(1) == pytest.approx([2.0], abs=1e-6)  # it touches zero
-    rates = found.derivative().at(np.array([1.0]))[:, 0]
-    assert rates == pytest.approx([-np.sin(1.0), -2.0], abs=1e-7)
+    assert found.derivative().at(np.array([1.0]))[:, 0] == pytest.approx([-np.sin(1.0), -2.0], abs=1e-7)
 
 
 def test_many_mechanisms_have_breaks_of_their_own() -> None:

@@ -1,7 +1,5 @@
 """Unrolled solves against numpy.linalg on stacks, dual systems and eigenvalues against formulas and differences."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lines, poses and screws against points, directions, 4 × 4 matrices and SciPy's matrix functions; [P 1-7]."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -52,8 +50,7 @@ def test_p2_dual_angle_is_angle_and_distance() -> None:
     place = lines.pose(rows(random_rotations(RNG, COUNT)), vector(P))
     axis, first = (apply(place, lines.line((0.0, 0.0, 0.0), one)) for one in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
     moved = product(place, lines.turn_z(spatial(theta, s)))
-    second = apply(moved, lines.line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
-    angle = lines.angle_about(axis, first, second)
+    angle = lines.angle_about(axis, first, apply(moved, lines.line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))))
     same(angle.real, theta)
     same(angle.dual, s, 1e-12)
 
@@ -184,8 +181,7 @@ def test_exp_is_the_matrix_exponential(theta: float) -> None:
 @pytest.mark.parametrize("theta", ANGLES)
 def test_log_undoes_exp(theta: float) -> None:
     one = screw(np.full(COUNT, theta), RNG.normal(size=COUNT))
-    found = lines.log(lines.exp(one))
-    for part, expected in zip(apart(found), apart(one), strict=True):
+    for part, expected in zip(apart(lines.log(lines.exp(one))), apart(one), strict=True):
         np.testing.assert_allclose(part, expected, rtol=0, atol=3e-13)
 
 
@@ -198,10 +194,8 @@ def test_exp_undoes_log_of_any_pose() -> None:
 @pytest.mark.slow
 def test_half_turn() -> None:
     """Of ± û one is given, with the slide along it; about every axis, those of the frame included."""
-    directions = np.concatenate([np.eye(3), -np.eye(3), U])
-    for direction in directions:
-        one = scaled(Dual(np.pi, 0.7), line((0.3, -0.2, 0.5), tuple(direction)))
-        pose = lines.exp(one)
+    for direction in np.concatenate([np.eye(3), -np.eye(3), U]):
+        pose = lines.exp(scaled(Dual(np.pi, 0.7), line((0.3, -0.2, 0.5), tuple(direction))))
         found = lines.log(pose)
         for part, expected in zip(apart(lines.exp(found)), apart(pose), strict=True):
             np.testing.assert_allclose(part, expected, rtol=0, atol=2e-14)

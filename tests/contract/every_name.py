@@ -1,7 +1,5 @@
 """A script of a user with every public name, for the type checker; it is not run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import reveal_type
 

@@ -1,7 +1,5 @@
 """`result.trunnion`: what a result of every kind says of itself; its columns, files and workbook."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -86,8 +84,7 @@ def test_names_and_patterns_pick_columns() -> None:
 def test_a_file_has_the_columns_asked_for(tmp_path: Path) -> None:
     data = result_of("durango-fourbar")
     trunnion.save(data, tmp_path / "motion.csv", columns=["motion"])
-    table = pd.read_csv(tmp_path / "motion.csv")
-    assert list(table) == names(data, "motion")
+    assert list(pd.read_csv(tmp_path / "motion.csv")) == names(data, "motion")
     pytest.importorskip("pyarrow")
     data.trunnion.save(tmp_path / "some.parquet", columns=["A.effort"])
     assert list(pd.read_parquet(tmp_path / "some.parquet")) == ["time", "A.effort"]
@@ -97,16 +94,14 @@ def test_a_workbook_has_heads_units_and_numbers(tmp_path: Path) -> None:
     openpyxl = workbooks()
     data = result_of("durango-fourbar")
     trunnion.save(data, tmp_path / "cycle.xlsx")
-    book = openpyxl.load_workbook(tmp_path / "cycle.xlsx")
-    (sheet,) = book.worksheets
+    (sheet,) = openpyxl.load_workbook(tmp_path / "cycle.xlsx").worksheets
     assert sheet.title == "positions"
     heads, units, *rows = sheet.iter_rows(values_only=True)
     known = columns(data)
     assert list(heads) == [name for name, _, _ in known]
     assert [unit or "" for unit in units] == [unit for _, unit, _ in known]
     assert len(rows) == STEPS
-    effort = [row[heads.index("A.effort")] for row in rows]
-    assert np.allclose(effort, data["drive_effort"][0])
+    assert np.allclose([row[heads.index("A.effort")] for row in rows], data["drive_effort"][0])
     assert sheet.freeze_panes == "B3"
 
 

@@ -1,7 +1,5 @@
 """Without any extra every verb works; what only an extra brings is asked for by its name."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A slice of the damaged files of `python -m benchmarks.fuzz`: findings or a result, nothing else, and no long wait."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

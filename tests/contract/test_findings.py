@@ -1,7 +1,5 @@
 """What the sources keep to: findings have codes and figures, kernels know no engine."""
 
-from __future__ import annotations
-
 import ast
 import json
 import re
@@ -79,8 +77,7 @@ RECORDED = {"Traced", "Recorded", "UntraceableError"}
 
 @pytest.mark.parametrize("path", [path for path in KERNELS if path not in ENTRANCES], ids=str)
 def test_a_kernel_knows_no_engine(path: Path) -> None:
-    tree = ast.parse((SOURCE / path).read_text("utf-8"))
-    for node in ast.walk(tree):
+    for node in ast.walk(ast.parse((SOURCE / path).read_text("utf-8"))):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         modules = [node.module or "", *names] if isinstance(node, ast.ImportFrom) else names
         assert not any(module.startswith("trunnion.engines") for module in modules), f"{path}:{node.lineno}"

@@ -1,7 +1,5 @@
 """The wheel as a user installs it: typed, with its examples and its browser modules, run as a command and a module."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Every key that a joint of every pair may state changes a result, or a finding says that it does not."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where the members of a variable have units of their own, the variable says so, and a coordinate has that of each."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from pathlib import Path

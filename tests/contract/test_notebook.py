@@ -1,7 +1,5 @@
 """What a notebook shows of mechanisms and results: axes, tables, drawings."""
 
-from __future__ import annotations
-
 import re
 from html import unescape
 from pathlib import Path

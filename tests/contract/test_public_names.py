@@ -1,7 +1,5 @@
 """The public names: few, typed, documented, with one name for one argument; old names warn."""
 
-from __future__ import annotations
-
 import inspect
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The list of seeded faults follows the sources: the text of each stands exactly once in its file."""
 
-from __future__ import annotations
-
 import pytest
 from benchmarks.faults import FAULTS, Fault
 from benchmarks.mutants import applies

@@ -1,7 +1,5 @@
 """Two drives, one large group, and a benchmark of other codes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 

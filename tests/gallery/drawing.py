@@ -1,7 +1,5 @@
 """Linkages of the gallery that draw: a straight line, the steps of two walking legs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

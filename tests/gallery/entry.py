@@ -1,17 +1,13 @@
 """What the gallery says of an example: one checked fact, and how it is drawn; linkages closed by hand for the facts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from trunnion import Mechanism, analyse
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 STEPS = 72  # positions of the result that a fact is read from
 
@@ -23,7 +19,7 @@ class Outcome:
     mechanism: Mechanism
     result: xr.Dataset
 
-    def over(self, steps: int) -> Outcome:
+    def over(self, steps: int) -> "Outcome":
         """The same over another number of positions."""
         return Outcome(self.mechanism, analyse(self.mechanism, steps))
 

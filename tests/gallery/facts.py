@@ -5,14 +5,10 @@
 modules below, or into a module of its own that gets a line here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from gallery import benchmarks, drawing, four_bars, in_time, presses, several_loops, sliders, spatial, toleranced
 from gallery.entry import Entry
-
-__all__ = ["ENTRIES", "REFUSED", "SECTIONS"]
 
 SECTIONS: Mapping[str, Mapping[str, Entry]] = {
     "Four-bars": four_bars.ENTRIES,

@@ -1,7 +1,5 @@
 """Four-bars of the gallery."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import trunnion
@@ -43,8 +41,7 @@ def torque_by_virtual_work() -> float:
 # spring-balanced-lamp
 def hold(one: Outcome) -> float:
     """Largest torque at the pivot without friction."""
-    ideal = trunnion.analyse(one.mechanism.with_friction("off"), 36)
-    return float(np.abs(ideal["drive_effort"]).max())
+    return float(np.abs(trunnion.analyse(one.mechanism.with_friction("off"), 36)["drive_effort"]).max())
 
 
 # straight lines: largest less least height of the point, at every half degree
@@ -58,8 +55,7 @@ def height_of_hoecken(one: Outcome) -> float:
 
 def height_of_hoecken_by_hand() -> float:
     b = 0.04 * np.exp(1j * np.radians(np.arange(90, 270.25, 0.5)))
-    c = corner(b, 0.08, 0.1, 0.1, -1)
-    return float(np.ptp((b + 2 * (c - b)).imag))
+    return float(np.ptp((b + 2 * (corner(b, 0.08, 0.1, 0.1, -1) - b)).imag))
 
 
 def height_of_chebyshev(one: Outcome) -> float:
@@ -71,8 +67,7 @@ def height_of_chebyshev_by_hand() -> float:
     """Left rocker and coupler are one rigid arm A C at every angle between them."""
     unit, turn = 0.03, np.exp(1j * np.radians(np.arange(60, 180.25, 0.5)))
     arm = 5 + 2 * turn
-    c = corner(0j, 4, np.abs(arm), 5, 1)
-    return float(np.ptp(unit * ((5 + turn) * c / arm).imag))
+    return float(np.ptp(unit * ((5 + turn) * corner(0j, 4, np.abs(arm), 5, 1) / arm).imag))
 
 
 ENTRIES = {

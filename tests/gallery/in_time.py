@@ -1,7 +1,5 @@
 """Linkages of the gallery that move by themselves: what `simulate` finds, held against equations written out here."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Linkages of the gallery that press: two knuckle joints and a crusher."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Linkages of several loops of the gallery, and linkages with gears."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -81,8 +79,7 @@ def rest_of_stephenson() -> float:
         return first, second
 
     crank = np.radians(np.arange(90, 241, 5))
-    found = closed(loops, crank, (4.1, 1.9, 5.3, 3.9))
-    return float(np.ptp(found[6:, 3]))
+    return float(np.ptp(closed(loops, crank, (4.1, 1.9, 5.3, 3.9))[6:, 3]))
 
 
 ENTRIES = {
@@ -110,8 +107,7 @@ def expected_height() -> float:
     """Height of the tool's path over two turns, its place by the circle intersection of the two rods."""
     turn = 4 * np.pi * np.arange(STEPS) / STEPS
     b, d = 0.035 * np.exp(1j * turn), 0.120 + 0.045 * np.exp(1j * (np.radians(40) - turn / 2))
-    c = corner(b, d, 0.130, 0.120, 1)
-    tool = b + (0.150 + 0.045j) * (c - b) / 0.130
+    tool = b + (0.150 + 0.045j) * (corner(b, d, 0.130, 0.120, 1) - b) / 0.130
     return float(np.ptp(tool.imag))
 
 

@@ -1,7 +1,5 @@
 """Linkages with slides of the gallery."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

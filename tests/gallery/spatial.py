@@ -1,7 +1,5 @@
 """Spatial linkages of the gallery. Angles and slides are those of the tables of the examples, in rad and m."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Linkages of the gallery with tolerances, with play and misaligned axes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 

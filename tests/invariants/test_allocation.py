@@ -1,7 +1,5 @@
 """An allocation does not depend on units or order; a wider limit costs no more, what is known to do is not refused."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

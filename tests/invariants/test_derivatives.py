@@ -1,7 +1,5 @@
 """Dual numbers through a whole analysis equal central differences, for every output by every number of the model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

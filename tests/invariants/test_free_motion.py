@@ -1,7 +1,5 @@
 """What holds of every motion in time: machine code equals walks, where it ends and why, bad numbers are refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -154,8 +152,7 @@ def rocker(friction: float) -> Mechanism:
 def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -> None:
     """It is foreseen, told with its place and time, and reached in some hundred evaluations."""
     motion = FreeMotion.of(prepare(rocker(friction)))
-    integration = ActiveMotion(motion, Walks(motion), 2.0, 1e-9)
-    found = integration.run(initial_row(motion))
+    found = ActiveMotion(motion, Walks(motion), 2.0, 1e-9).run(initial_row(motion))
     assert found.ended is not None
     assert found.ended.code == "simulate.dead_centre"
     assert found.ended.figures["coordinate"] == pytest.approx(np.arccos(-0.78125), abs=close)
@@ -229,8 +226,7 @@ def ended(result: Any, code: str) -> dict[str, Any]:
 
 
 def figures(mechanism: Mechanism, steps: int) -> dict[str, tuple[Any, str]]:
-    result = simulate(mechanism, 1.0, steps)
-    return {one.name: (one.value, one.place) for one in result.trunnion.summary}
+    return {one.name: (one.value, one.place) for one in simulate(mechanism, 1.0, steps).trunnion.summary}
 
 
 def test_the_figures_at_the_end_are_of_the_end() -> None:
@@ -257,8 +253,7 @@ def test_a_range_ends_the_motion_of_several_drivers(
     kind = PARALLELOGRAM[0], [0.875, -0.273]  # at the start of the range
     data = beside(driven_four_bar(space, *kind, range=[-2.0, 1.7 if first else 2.9])).data()
     data["drivers"]["W"] |= {"range": [-1.0, 2.0], "speed": 1, "initial": {"coordinate": 0.0, "speed": -3}}
-    result = simulate(Mechanism(**data), 1.0, 40)
-    figures = ended(result, "range")
+    figures = ended(simulate(Mechanism(**data), 1.0, 40), "range")
     assert figures["driver"] == ("A" if first else "W")
     assert figures["coordinate"] == pytest.approx(1.7 if first else -1.0, abs=1e-12)
     time = np.sqrt(2 * 0.7 * INERTIA / 2.0)

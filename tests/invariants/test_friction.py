@@ -1,7 +1,5 @@
 """Every friction is what its law says for its load wherever the status says solved; following it from none to all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

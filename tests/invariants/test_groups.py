@@ -1,7 +1,5 @@
 """Groups by themselves: closed forms against the general group, which is held against finite differences and power."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Laws by themselves: friction, loads of bearings, impacts, the active set, shares of friction."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from math import exp, tanh
@@ -98,8 +96,7 @@ def test_a_moment_across_a_bearing_is_carried_by_its_ends() -> None:
     inside, outside = 0.1 * LENGTH, 0.8 * LENGTH
     assert of(bearing, 0, 60.0, 0, -60.0 * inside, 0, 0) == pytest.approx(60.0)
     assert of(bearing, 0, 60.0, 0, -60.0 * outside, 0, 0) == pytest.approx(60.0 * 2 * outside / LENGTH)
-    threaded = BearingLoad(ORIGIN, LENGTH, flank=1.25)
-    assert of(threaded, 0, 0, -80.0, 0, 0, 0) == pytest.approx(100.0)
+    assert of(BearingLoad(ORIGIN, LENGTH, flank=1.25), 0, 0, -80.0, 0, 0, 0) == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize("off", [0.0, 0.1, 0.4, 0.9])

@@ -1,7 +1,5 @@
 """Loads that vary and follow, tables, springs and dampers: closed forms, energy, virtual work, and refusals."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
@@ -194,8 +192,7 @@ def test_outside_its_table_a_load_has_no_value() -> None:
     data["loads"] = {"push": {"link": "piston", "at": "P", "force": ["f", 0]}}
     result = analysed(data)
     out = result["time"].values > 0.5
-    status = result["status"].values
-    np.testing.assert_array_equal(status == trunnion.Status.LOAD_UNDEFINED, out)
+    np.testing.assert_array_equal(result["status"].values == trunnion.Status.LOAD_UNDEFINED, out)
     assert np.all(np.isnan(effort(result)) == out)
     assert np.all(np.isfinite(result["point_velocity"].values))
     row = next(row for row in findings(result) if row["where"] == "loads.push")

@@ -1,7 +1,5 @@
 """What holds of the figures of measures whatever the mechanism, and of extremes on panels."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

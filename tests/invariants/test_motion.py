@@ -1,7 +1,5 @@
 """Motion laws of drivers: published factors, exact derivatives, and what the analysis makes of them."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

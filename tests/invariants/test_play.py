@@ -1,7 +1,5 @@
 """What holds for the play of every pair and linkage, and seats where there is little to seat."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path
@@ -49,8 +47,7 @@ def test_a_force_at_one_end_of_a_pin_presses_there_alone(model: Any) -> None:
     """A force at z = ±H/2 has the moment r × F about mid-length; the other end feels nothing of it."""
     force, length = np.array([30.0, -40.0, 0.0]), 0.08
     for end, z in ((0, -length / 2), (1, length / 2)):
-        moment = np.cross([0.0, 0.0, z], force)
-        loads = model.loads(tuple(force), tuple(moment), length)
+        loads = model.loads(tuple(force), tuple(np.cross([0.0, 0.0, z], force)), length)
         np.testing.assert_allclose(loads[end], force[:2], atol=1e-12)
         np.testing.assert_allclose(loads[1 - end], 0.0, atol=1e-12)
 
@@ -145,10 +142,8 @@ def massless_compressor() -> dict[str, Any]:
 @pytest.mark.slow
 def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
     """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
-    data = massless_compressor()
-    result = analyse(Mechanism(**data), steps=360)
-    lost = np.flatnonzero(result["contact_lost"].sel(joint="P"))
-    assert np.array_equal(lost, np.arange(40, 181))
+    result = analyse(Mechanism(**massless_compressor()), steps=360)
+    assert np.array_equal(np.flatnonzero(result["contact_lost"].sel(joint="P")), np.arange(40, 181))
     assert np.all(result["seat_offset"].sel(joint="P", end="1", axis=["x", "y"]).isel(position=slice(41, 180)) == 0)
     (finding,) = told(result, "contact.unloaded")  # of all joints at once, and no loss of any of them
     assert finding["figures"] == {"joints": ["O", "P", "Q"], "at": "between 40° and 180°"}

@@ -1,7 +1,5 @@
 """What is no more than rounding is 0 in every figure, has no place and makes no finding, however large all is."""
 
-from __future__ import annotations
-
 from itertools import cycle
 from typing import Any
 
@@ -174,5 +172,4 @@ def test_a_speed_near_the_end_of_the_floats_has_an_answer() -> None:
     """What has no finite force is not a number or infinite; nothing is divided by a scale that is 0."""
     data = trunnion.read(DURANGO).data()
     data["drivers"]["A"] = {"speed": 1e301}
-    result = trunnion.analyse(trunnion.Mechanism(**data), 6)
-    assert np.all(np.isfinite(result["point_position"]))
+    assert np.all(np.isfinite(trunnion.analyse(trunnion.Mechanism(**data), 6)["point_position"]))

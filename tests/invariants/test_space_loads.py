@@ -1,7 +1,5 @@
 """Loads of spatial models and losses of joints: by virtual work, closed forms, and the same as loads and dampers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -65,8 +63,7 @@ def test_a_cylindrical_joint_is_resisted_in_either_motion(key: str, motion: str)
 
 @pytest.mark.parametrize("name", ["B", "D"])
 def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -> None:
-    spring = {"joint": name, "preload": 2.0, "damping": 3.0}
-    result = brief(massless(springs={"spring": spring}), STEPS)
+    result = brief(massless(springs={"spring": {"joint": name, "preload": 2.0, "damping": 3.0}}), STEPS)
     rate = joint(result, "joint_rotation_velocity", name)
     taken = 2.0 * rate + 3.0 * rate**2
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())

@@ -1,7 +1,5 @@
 """Spatial groups by themselves: pairs in motion, closed form and general group, derivatives, balance of forces."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +44,7 @@ def dyad(sides: tuple[tuple[int, int], ...]) -> tuple[tuple[GroupJoint, ...], li
     b = compose(frames[0], links[0][0])
     c0 = compose(frames[0], links[0][1])
     turn, slide = rng.uniform(-3, 3, LANES), rng.normal(size=LANES)
-    c1 = MOTIONS["cylindrical"].place(c0, [turn, slide], 0.0)
-    frames[1] = relative(c1, links[1][0])
+    frames[1] = relative(MOTIONS["cylindrical"].place(c0, [turn, slide], 0.0), links[1][0])
     d = compose(frames[1], links[1][1])
     known = [
         MOTIONS["cylindrical"].place(one, [rng.uniform(-3, 3, LANES), rng.normal(size=LANES)], 0.0) for one in (b, d)
@@ -75,8 +72,7 @@ def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int
         sound = np.isfinite(pose.gap) & (pose.condition < 1e3)
         assert np.mean(sound) > 0.8
         assert np.max(pose.gap[sound]) < 1e-12
-        start = [q + 1e-3 for q in pose.q]
-        other = general.position(elements, start)
+        other = general.position(elements, [q + 1e-3 for q in pose.q])
         same = sound & np.isfinite(other.gap) & (np.abs(np.subtract(other.q, pose.q)).max(axis=0) < 0.1)
         solved += int(np.count_nonzero(same))
         found, wanted = (
@@ -106,7 +102,6 @@ def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_: bool) -> None
             data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
     result = brief(Mechanism(**data), 2000)
     place, speed = (result[f"point_{what}"].sel(point="rod.P").values for what in ("position", "velocity"))
-    step = float(result["time"][1] - result["time"][0])
-    found = (place[:, 2:] - place[:, :-2]) / (2 * step)
+    found = (place[:, 2:] - place[:, :-2]) / (2 * float(result["time"][1] - result["time"][0]))
     assert np.max(np.abs(found - speed[:, 1:-1])) < 2e-4 * np.max(np.abs(speed))
     assert float(result["closure_residual"].max()) < 1e-14

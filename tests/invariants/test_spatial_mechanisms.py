@@ -1,7 +1,5 @@
 """Spatial mechanisms seen from elsewhere, mirrored, enlarged, told the other way round; welds, driven spins, wedges."""
 
-from __future__ import annotations
-
 import copy
 import functools
 from collections.abc import Sequence
@@ -131,8 +129,7 @@ def test_a_driven_turn_is_no_free_spin() -> None:
     data = copy.deepcopy(rssr().data)
     data["links"]["crank"]["points"]["B"] = [0, 0, 0.01]
     data["assembly"] = {"D": 0.5}
-    run = prepare(Mechanism(**data))
-    assert run.system.plan.passive == ("rod",)
+    assert prepare(Mechanism(**data)).system.plan.passive == ("rod",)
     result = analyse(Mechanism(**data), STEPS)
     assert (result["status"] < Status.NOT_CONVERGED).all()
     np.testing.assert_allclose(result["joint_rotation_velocity"].sel(joint="D"), 0, atol=1e-10)

@@ -1,7 +1,5 @@
 """Positions without an answer, whole turns, hints, change points, and what is looked for once and kept."""
 
-from __future__ import annotations
-
 import copy
 import sys
 from pathlib import Path
@@ -40,8 +38,7 @@ def texts(result: Any) -> str:
 # cannot be assembled
 def test_not_assembled_over_part_of_the_turn() -> None:
     """|BD| = √(1 + 0.64 − 1.6 cos q) reaches BC + CD = 1.15 at one angle: values before it, NaN beyond."""
-    data = four_bar(0.8, 0.65, 0.5, 1.0)
-    result = analyse(data, 360)
+    result = analyse(four_bar(0.8, 0.65, 0.5, 1.0), 360)
     limit = np.degrees(np.arccos((1 + 0.64 - 1.15**2) / 1.6))
     q = np.arange(360)
     out = (q > limit) & (q < 360 - limit)
@@ -220,8 +217,7 @@ def test_angles_follow_their_rate_across_coarse_steps() -> None:
     """A link that turns 0.9 turns a step is not taken to turn back 0.1."""
     data = four_bar()
     data["drivers"]["A"] |= {"range": [0.0, 36 * np.pi * 0.9]}
-    result = brief(build(data), 19)
-    crank = result["link_angle"].sel(link="crank").values
+    crank = brief(build(data), 19)["link_angle"].sel(link="crank").values
     np.testing.assert_allclose(np.diff(crank), 2 * np.pi * 0.9, rtol=1e-12)
 
 

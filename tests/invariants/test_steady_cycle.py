@@ -1,7 +1,5 @@
 """Steady cycles, motions of many samples, and loads by place and speed, in time and over a cycle."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -211,8 +209,7 @@ def test_together_as_each_by_itself(name: str) -> None:
     values = spread(mechanism, 2, links__piston__mass=0.05, **dict.fromkeys(motor, 0.03))
     together = figures_in_time(prepare(mechanism), "O", values, 2, 0.3, 1e-10)
     for i in range(2):
-        own = of_sample(values, i)
-        alone = figures_in_time(prepare(mechanism), "O", own, 1, 0.3, 1e-10)
+        alone = figures_in_time(prepare(mechanism), "O", of_sample(values, i), 1, 0.3, 1e-10)
         for key in FIGURES:
             near = AGREED if key == "fluctuation" else 0.0  # a difference of speeds, by their mean
             np.testing.assert_allclose(together[key][i], alone[key][0], AGREED, near, err_msg=f"{key} of {i}")

@@ -1,7 +1,5 @@
 """Decomposition: order of modules, class, formula, what is said where drivers do not determine the motion; graphs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sweep is so many analyses: every point equals one, measures too, and what has no answer has no figures."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """What must hold for any mechanism: balance of power, change of frame, mirror, units, order of links, batches."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

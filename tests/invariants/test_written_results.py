@@ -1,7 +1,5 @@
 """Results as files: names, every bit of the numbers, whole or in part, at once or not at all."""
 
-from __future__ import annotations
-
 import csv
 import json
 import stat
@@ -165,8 +163,7 @@ def test_tables_in_the_units_of_the_model(tmp_path: Path) -> None:
     """Each column bears its unit, and its numbers are those in SI by the factor that it stands for."""
     import pandas as pd
 
-    model = trunnion.read(DURANGO.parent / "slider-crank.yaml")
-    result = trunnion.analyse(model, 8)
+    result = trunnion.analyse(trunnion.read(DURANGO.parent / "slider-crank.yaml"), 8)
     trunnion.save(result, tmp_path / "si.csv", units_row=True)
     trunnion.save(result, tmp_path / "own.csv", units="model")
     si, own = pd.read_csv(tmp_path / "si.csv", header=[0, 1]), pd.read_csv(tmp_path / "own.csv")

@@ -1,7 +1,5 @@
 """The command line as a user meets it: every verb; every fault with message and exit status, nothing half-written."""
 
-from __future__ import annotations
-
 import csv
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """`trunnion allocate` as a user meets it: tables, files, the model written, figures, report, faults."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Ctrl-C, a full disk and faults end in one line; no output is an input, links stay links, pipes are written to."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -1,7 +1,5 @@
 """Options of several verbs: what they mean together; tables, notes and help of the terminal."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

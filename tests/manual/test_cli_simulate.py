@@ -1,7 +1,5 @@
 """`trunnion simulate` and `locking` as a user meets them: options, files, ranges, reports."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

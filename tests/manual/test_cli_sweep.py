@@ -1,7 +1,5 @@
 """`trunnion sweep`, `play` and `assemble` as a user meets them: tables, files, figures, findings, faults."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -128,8 +126,7 @@ def test_too_little_clearance(program: Run, model: Path, tmp_path: Path) -> None
     assert len(found) == 36
     assert {row["status"] for row in found} == {"fits", "short"}
     again = xr.load_dataset(tmp_path / "f.nc")
-    mechanism = trunnion.read(model)
-    wanted = trunnion.assemble(mechanism, 36)
+    wanted = trunnion.assemble(trunnion.read(model), 36)
     np.testing.assert_array_equal(again.needed_share, wanted.needed_share)
     assert [float(row["needed_share"]) for row in found] == wanted.needed_share.values.tolist()
     assert float(found[3]["D.stated_2_y"]) == float(wanted.stated_offset.sel(joint="D", end="2", axis="y")[3])

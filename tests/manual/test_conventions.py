@@ -1,7 +1,5 @@
 """What docs/conventions.md says of pins in their holes, on linkages whose numbers follow by hand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ The blocks of a page run in order, in one folder with the examples at hand; Pyth
 CONTRIBUTING.md tells the marks. Links between pages are checked by `mkdocs build --strict`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import importlib.util
@@ -193,8 +191,7 @@ def test_every_key_of_the_model_is_told() -> None:
     yaml = pytest.importorskip("yaml")
     from trunnion.model import joint_parts, measure_table, mechanism, parts, tolerance_parts
 
-    told = yaml.safe_load((ROOT / "docs" / "meanings.yaml").read_text("utf-8"))
-    for name, keys in told.items():
+    for name, keys in yaml.safe_load((ROOT / "docs" / "meanings.yaml").read_text("utf-8")).items():
         modules = (mechanism, parts, joint_parts, tolerance_parts, measure_table)
         section = next(getattr(module, name) for module in modules if hasattr(module, name))
         assert keys.keys() == {field.alias or key for key, field in section.model_fields.items()}, name

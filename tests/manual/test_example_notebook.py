@@ -1,7 +1,5 @@
 """The example notebook runs, and its cells show what they say: drawing, table, plot, animation."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from html import unescape

@@ -4,8 +4,6 @@ Only blocks that no longer hold are rewritten. Lines that a page leaves out (`â€
 beside the line of the output that resembles it most, in order. What was changed is to be read before it is kept.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """Allocation problems on plain numbers, and a four-bar's sensitivities from its loop equation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -29,8 +27,7 @@ def rocker_sensitivities(crank: Array) -> Array:
     way = np.array([[l1], [0.0]]) - pin
     d = np.hypot(*way)
     along = (l3**2 - l4**2 + d**2) / (2 * d)
-    across = np.sqrt(l3**2 - along**2)
-    u3 = (along * way + across * np.stack([-way[1], way[0]])) / d / l3
+    u3 = (along * way + np.sqrt(l3**2 - along**2) * np.stack([-way[1], way[0]])) / d / l3
     u4 = (pin + l3 * u3 - np.array([[l1], [0.0]])) / l4
     u2 = pin / l2
     lever = l4 * (-u4[1] * u3[0] + u4[0] * u3[1])

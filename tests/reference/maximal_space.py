@@ -5,8 +5,6 @@ elements: "no gap along a", "a of one is square to b of the other", "turned by s
 first derivatives give the velocities, their second the accelerations. Loops, groups and joint coordinates do not occur.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -19,11 +17,6 @@ Data = dict[str, Any]
 TURN = 2 * np.pi
 Row = tuple[Any, Any, Any]  # numbers, or one for each of several motions
 
-__all__ = [
-    "Drive", "Frame", "Linkage", "Motion", "cross", "element", "gap", "in_planes", "point", "pose_of", "published",
-    "raised", "rotation", "turned", "unrolled",
-]  # fmt: skip
-
 
 class Frame(NamedTuple):
     """Place of the origin, m, and axes x, y, z as columns."""
@@ -31,10 +24,10 @@ class Frame(NamedTuple):
     place: Array
     axes: Array
 
-    def __matmul__(self, other: Frame) -> Frame:  # type: ignore[override]
+    def __matmul__(self, other: "Frame") -> "Frame":  # type: ignore[override]
         return Frame(self.place + self.axes @ other.place, self.axes @ other.axes)
 
-    def inverse(self) -> Frame:
+    def inverse(self) -> "Frame":
         return Frame(-self.axes.T @ self.place, self.axes.T)
 
 

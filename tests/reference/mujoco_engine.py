@@ -5,8 +5,6 @@ dynamics, Jacobians of the cut pins and forces between bodies. Here the loops ar
 and friction is iterated from the engine's forces: M = f r |F| at a pin, f times the load of both ends in a guide.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -15,8 +13,6 @@ import pytest
 from mechanisms import Array, Data
 
 mj = pytest.importorskip("mujoco")
-
-__all__ = ["Engine"]
 
 Z = np.array([0.0, 0.0, 1.0])
 

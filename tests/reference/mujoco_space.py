@@ -5,8 +5,6 @@ dynamics and the forces between bodies. Loops are closed here, by Newton on the 
 (`maximal_space`), whose derivatives are those Jacobians. No friction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -17,8 +15,6 @@ from reference.maximal_space import GAPS, SQUARE, Array, Data, Drive, Frame, Mot
 from reference.space_oracle import Oracle
 
 mj = pytest.importorskip("mujoco")
-
-__all__ = ["Engine", "Forces"]
 
 TREE = {"revolute": ("hinge",), "prismatic": ("slide",), "cylindrical": ("slide", "hinge"), "spherical": ("ball",)}
 TYPES = {"hinge": mj.mjtJoint.mjJNT_HINGE, "slide": mj.mjtJoint.mjJNT_SLIDE, "ball": mj.mjtJoint.mjJNT_BALL}

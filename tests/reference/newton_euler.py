@@ -9,8 +9,6 @@ Signs. Everything a joint transmits is stated as it acts *on the second body, by
 about the joint's point. A wrench is force and moment together, six numbers. The ground is the body None. SI units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -18,8 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Vector = NDArray[np.float64]
-
-__all__ = ["Body", "Joint", "Load", "Rubbing", "Solution", "loads_of_bearings", "solve", "solve_with_friction"]
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,11 @@
 """The crank press of the tests of loads that jump, as plain data, and its closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 
 from mechanisms_parts import Data, joined, slide
 from trunnion import Mechanism
-
-__all__ = ["arm", "press"]
 
 
 def press(dimensions: Data | None = None, **sections: Any) -> Mechanism:

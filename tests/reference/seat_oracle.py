@@ -5,8 +5,6 @@ elements moved by the seats in the model data (`moved`), seats and reactions in 
 linkage is one whose links planar pairs hold (`in_planes`): a pin has one end, a guide two that move across alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,8 +15,6 @@ from scipy.spatial.transform import Rotation
 from reference.maximal_space import SLIDING, Array, Data, Drive, Frame, Motion, element, point, rotation
 from reference.newton_euler import Solution
 from reference.space_oracle import Oracle, merged
-
-__all__ = ["Settled", "clearance", "moved", "settle", "travelling"]
 
 ENDS = {"spherical": [[0, 1, 2]], "pin": [[0, 1]], "slot": [[1], [1]]}  # axes along which each end may move
 

@@ -4,8 +4,6 @@ Friction is by the formulas of the documentation, written here once more from th
 of a bearing: Pezzuti et al. (2006), eqs. 15–19, and the vector sum in its place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -13,8 +11,6 @@ import numpy as np
 
 from reference.maximal_space import SLIDING, Array, Data, Frame, Linkage, Motion, gap, turned
 from reference.newton_euler import Body, Joint, Load, Rubbing, Solution, solve_with_friction
-
-__all__ = ["Oracle", "Slip", "merged"]
 
 MATRIX = (("xx", "xy", "xz"), ("xy", "yy", "yz"), ("xz", "yz", "zz"))
 

@@ -1,7 +1,5 @@
 """Allocation through the model: values of closed forms, exhaustive search, and the mechanism with what was found."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -139,8 +137,7 @@ def test_yield() -> None:
 def test_options_as_stated_cost_what_keeps_them() -> None:
     """A half width between two options is bought as the cheapest that keeps it; one below all has no cost."""
     data = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data()
-    paid = {"±0.02 mm": 11.8, "±0.03 mm": 4.2, "±0.2 mm": 1.5, "±0.007 mm": np.nan}
-    for stated, cost in paid.items():
+    for stated, cost in {"±0.02 mm": 11.8, "±0.03 mm": 4.2, "±0.2 mm": 1.5, "±0.007 mm": np.nan}.items():
         model = Mechanism(**{**data, "tolerances": {**data["tolerances"], "l2": stated}})
         result = trunnion.allocate(model, steps=12, samples=0)
         assert float(result["cost_before"].sel(parameter="dimensions.l2")) == pytest.approx(cost, nan_ok=True)
@@ -220,8 +217,7 @@ def test_lopsided_tolerances_take_room() -> None:
 )
 def test_measures_keep_their_limits(measure: dict[str, str]) -> None:
     """The worst case that is found on the mechanism keeps the limits, to second order, and samples do."""
-    model = fourbar(measures={"m": measure})
-    result = trunnion.allocate(model, steps=24, samples=300)
+    result = trunnion.allocate(fourbar(measures={"m": measure}), steps=24, samples=300)
     assert result.attrs["found"]
     assert not [one for one in findings(result, "error") if "beyond" in one]
     assert float(result["yield"][0]) > 0.99

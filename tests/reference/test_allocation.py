@@ -1,7 +1,5 @@
 """Allocation: reference values, closed forms, SciPy's optimisers, what cannot be met, and many rows."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ The assemblies of the class III group are counted by other means: the plate's an
 circles, and what remains, the length of the third rod, is looked at for changes of sign.
 """
 
-from __future__ import annotations
-
 import copy
 import re
 from pathlib import Path
@@ -87,8 +85,7 @@ def test_every_listed_way_is_what_its_name_gives(name: str) -> None:
 
 def test_a_start_in_line_is_listed_where_its_ways_are_apart() -> None:
     """A parallelogram that starts in line: at the start both ways put C on one spot."""
-    data = four_bar(0.3, 1.0, 0.3, 1.0)
-    choice = choice_of(data)
+    choice = choice_of(four_bar(0.3, 1.0, 0.3, 1.0))
     assert choice.where == "1° of A"
     places = [np.array(way.joints["C"]) for way in choice.ways]
     assert np.hypot(*(places[0] - places[1])) > 1e-3
@@ -216,8 +213,7 @@ def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
     for way in choice.ways:
         run = prepare(Mechanism(**{**data, "assembly": {choice.link: way.name}}))
         time = np.array([share * run.cycle.duration])
-        walk = run.solve(time).walk
-        place = walk.point(run.system.joints[joint][1][1], joint).place
+        place = run.solve(time).walk.point(run.system.joints[joint][1][1], joint).place
         stated = [float(np.ravel(part)[0]) for part in place]
         at = float(np.ravel(run.system.drive(run.values, driver, time)[0])[0])
         hinted = prepare(Mechanism(**{**data, "assembly": {joint: stated, "at": at}}))
@@ -321,8 +317,7 @@ def test_random_linkages_are_assembled_as_drawn(first: int, count: int) -> None:
     """Where the driver is as drawn, the frames of all links coincide; without a warning that one had to choose."""
     looked = 0
     for seed in range(first, first + count):
-        mechanism = drawn(seed)
-        run = prepare(mechanism)
+        run = prepare(drawn(seed))
         start = float(run.values[next(path for path in run.values if path.endswith("range.from"))])
         if start > 0.0:
             continue

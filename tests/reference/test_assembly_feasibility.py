@@ -1,7 +1,5 @@
 """Does it assemble at all: closed forms, an independent closure with SciPy's optimiser, invariances, what is said."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -257,13 +255,11 @@ def test_stated_clearances_enough_and_not() -> None:
     rigid = solved(four_bar(errors))
     assert (rigid.status == AssemblyStatus.RIGID).all()
     need = float(rigid.smallest_clearance)
-    tall = {name: {"clearance": 1.0001 * need} for name in "ABCD"}
-    enough = solved(four_bar(errors, tall))
+    enough = solved(four_bar(errors, {name: {"clearance": 1.0001 * need} for name in "ABCD"}))
     assert (enough.status == AssemblyStatus.FITS).all()
     assert float(enough.largest_share) == pytest.approx(1 / 1.0001, rel=1e-9)
     assert [row["severity"] for row in json.loads(enough.attrs["findings"])] == ["note"]
-    low = {name: {"clearance": 0.9 * need} for name in "ABCD"}
-    short = solved(four_bar(errors, low))
+    short = solved(four_bar(errors, {name: {"clearance": 0.9 * need} for name in "ABCD"}))
     np.testing.assert_array_equal(short.status == AssemblyStatus.SHORT, short.needed_clearance > 0.9 * need)
     np.testing.assert_allclose(short.needed_share * 0.9 * need, short.needed_clearance, rtol=1e-9)
     (told,) = json.loads(short.attrs["findings"])
@@ -302,8 +298,7 @@ def test_where_it_cannot_be_assembled() -> None:
     assert np.isnan(found.needed_clearance[apart]).all()
     assert np.isfinite(found.needed_clearance[~apart]).all()
     assert float(found.closure_residual.max()) < OPEN
-    told = json.loads(found.attrs["findings"])
-    assert any(row["code"] == "assembly.apart" for row in told)
+    assert any(row["code"] == "assembly.apart" for row in json.loads(found.attrs["findings"]))
 
 
 @pytest.mark.slow

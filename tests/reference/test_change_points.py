@@ -1,7 +1,5 @@
 """Linkages through their change points, against closed forms: the links go on smoothly, with forces by virtual work."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -51,8 +49,7 @@ def crossed(a: float, d: float) -> Callable[[Array], Array]:
     """tan(φ/2) = −tan(θ/2) (d + a)/(d − a), from d (cos φ − cos θ) + a (1 − cos(φ − θ)) = 0."""
 
     def place(theta: Array) -> Array:
-        half = np.arctan2(-(d + a) * np.sin(theta / 2), (d - a) * np.cos(theta / 2))
-        return d + a * np.exp(2j * half)
+        return d + a * np.exp(2j * np.arctan2(-(d + a) * np.sin(theta / 2), (d - a) * np.cos(theta / 2)))
 
     return place
 
@@ -152,8 +149,7 @@ def test_motions_in_time_go_on_as_smoothly(
     """From rest under 2 N m: ½ J(θ) θ̇² = T (θ − θ₀), J from the closed form of the place of C."""
     (a, b, c, d), hint = kind
     motor = {"kind": "constant", "effort": sense * 2.0}
-    mechanism = driven_four_bar(space, (a, b, c, d), hint, motor=motor)
-    data = mechanism.data()
+    data = driven_four_bar(space, (a, b, c, d), hint, motor=motor).data()
     data["drivers"]["A"]["initial"] = {"coordinate": 1.0, "speed": 0.0}
     result = simulate(Mechanism(**data), 1.6, 40, 1e-11)
     theta, rate = result["drive_coordinate"].values[0], result["drive_rate"].values[0]

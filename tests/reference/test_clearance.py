@@ -4,8 +4,6 @@ The pin's shift against the screw along the common perpendicular of two lines, 5
 seats against an optimiser over the play; friction against the balance of a contact.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -168,8 +166,7 @@ def test_loaded_seat_does_most_work(space: str, kind: str) -> None:
         wrench = np.zeros(6)
         wrench[["xyzabc".index(part) for part in parts]] = rng.normal(size=len(parts)) * rng.choice([1.0, 30.0])
         matrices = held(space, kind, length)
-        load = wrench[["xyzabc".index(part) for part in parts]]
-        motion, work = best_motion(matrices, radii, load)
+        motion, work = best_motion(matrices, radii, wrench[["xyzabc".index(part) for part in parts]])
         loads = play.loads(tuple(wrench[:3]), tuple(wrench[3:]), length)
         seat = [np.array(pressed(q, r), float) for q, r in zip(loads, radii, strict=True)]
         for matrix, vector, radius in zip(matrices, seat, radii, strict=True):

@@ -1,7 +1,5 @@
 """All variables of a cycle by the compiled engine against NumPy's, with the locking margin and the statuses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The designer's figures against closed forms and against the forces of the analysis."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any
 
@@ -26,8 +24,7 @@ def test_dead_centres_of_the_case_study() -> None:
 
 def test_slider_crank_turns_back_in_line() -> None:
     """r = 50, l = 200, e = 0: at 0 and 180°; the least transmission angle is acos(r/l)."""
-    mechanism = trunnion.read("examples/toleranced-slider-crank.yaml")
-    found = figures.design(mechanism)
+    found = figures.design(trunnion.read("examples/toleranced-slider-crank.yaml"))
     np.testing.assert_allclose(found.dead_centres["S"], [0.0, np.pi], atol=1e-12)
     assert found.transmission_angle["P-Q-S"] == pytest.approx(np.arccos(50 / 200), abs=1e-12)
 
@@ -66,8 +63,7 @@ def test_shaking_force_is_what_the_joints_pass_to_the_frame(name: str) -> None:
     data["gravity"] = [0, 0]
     mechanism = build(data).with_friction("off")
     run = prepare(mechanism)
-    time = run.cycle.times(24)
-    back = run.solve(time)
+    back = run.solve(run.cycle.times(24))
     x, y, turn = np.zeros(24), np.zeros(24), np.zeros(24)
     ground = mechanism.fixed_link
     for joint, (_, (first, second)) in run.system.joints.items():
@@ -76,8 +72,7 @@ def test_shaking_force_is_what_the_joints_pass_to_the_frame(name: str) -> None:
         sign = -1.0 if first == ground else 1.0  # the reaction is on the second link, by the first
         reaction = back.reactions[joint]
         x, y = x + sign * reaction.x, y + sign * reaction.y
-        effort = back.efforts.get(joint, 0.0)
-        turn = turn + sign * (reaction.m + effort)
+        turn = turn + sign * (reaction.m + back.efforts.get(joint, 0.0))
     (fx, fy), moment = figures.shaking(back.walk)
     size = np.max(np.hypot(fx, fy))
     np.testing.assert_allclose(x, fx, atol=1e-9 * size)
@@ -96,8 +91,7 @@ def test_counterweights_cancel_the_shaking_force_of_a_four_bar() -> None:
     data["gravity"] = [0, 0]
     for weight in weights:
         link = data["links"][weight.link]
-        values = mechanism.parameters()
-        mass = values[f"links.{weight.link}.mass"]
+        mass = mechanism.parameters()[f"links.{weight.link}.mass"]
         x, y = run.system.centre(run.values, weight.link)
         added = 1.0  # kg, at weight / 1 kg from the origin
         link["mass"] = mass + added
@@ -123,8 +117,7 @@ def test_work_that_cancels_gives_no_efficiency() -> None:
     """A constant force over a closed path does no net work, whatever the sampling leaves of it."""
     data = model(four_bar(), friction=None)
     data["drivers"] = {"A": {"law": "polynomial-345", "range": [0.0, 1.5], "duration": 0.5, "dwell": 0.1}}
-    result = trunnion.analyse(Mechanism(**data), 360)
-    assert np.isnan(result["efficiency"])
+    assert np.isnan(trunnion.analyse(Mechanism(**data), 360)["efficiency"])
 
 
 def test_a_link_at_rest_does_not_turn_back() -> None:
@@ -132,8 +125,7 @@ def test_a_link_at_rest_does_not_turn_back() -> None:
     data = slider_crank()
     (driver,), (slide,) = data["drivers"], (n for n, one in data["joints"].items() if one["type"] == "prismatic")
     data["drivers"][driver] = {"law": "modified-sine", "range": [0.4, 1.2], "duration": 0.2, "dwell": 0.1}
-    found = figures.dead_centres(prepare(build(data)))
-    assert found[slide] == ()
+    assert figures.dead_centres(prepare(build(data)))[slide] == ()
 
 
 DYADS = ["four-bar", "four-bar, other branch", "slider-crank", "inverted slider-crank", "Scotch yoke", "elliptic bar",

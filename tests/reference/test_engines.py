@@ -1,7 +1,5 @@
 """What is recorded and compiled gives the numbers of NumPy: operations, functions, loops, tables, in any split."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -141,8 +139,7 @@ def test_loops_within_loops() -> None:
 
         return looped(halved, [x * 0.0 + 1.0], 9)
 
-    rng = np.random.default_rng(6)
-    x, y = rng.uniform(0.5, 4.0, (2, 33))
+    x, y = np.random.default_rng(6).uniform(0.5, 4.0, (2, 33))
     (found,) = compiled(roots, x, y)
     np.testing.assert_allclose(found, np.sqrt(x), rtol=1e-15)
 

@@ -1,7 +1,5 @@
 """Friction by direction, of rollers, at rest, at bearing ends and of bristles, against closed forms and scans."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path
@@ -325,8 +323,7 @@ def test_dahl_from_rest() -> None:
     """Over a range the bristles start at rest: F = f N (1 − exp(−κ x/f)), exactly."""
     data = {**block(0.0, DAHL), "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}}}
     result = brief(Mechanism(**data), 41)
-    slide = result["joint_slide"].sel(joint="S").values
-    expected = 0.12 * 2.0 * G * (1 - np.exp(-4e3 * slide / 0.12))
+    expected = 0.12 * 2.0 * G * (1 - np.exp(-4e3 * result["joint_slide"].sel(joint="S").values / 0.12))
     np.testing.assert_allclose(-result["friction_force"].sel(joint="S").values, expected, rtol=1e-9, atol=1e-12)
 
 

@@ -1,7 +1,5 @@
 """Gear pairs, racks, chains and screws against geometry, virtual work, statics by hand and the textbook's screw."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
@@ -162,8 +160,7 @@ def wheel_and_rack(driver: Data) -> Data:
 
 def test_driven_rack_turns_the_pinion() -> None:
     """The pair the other way round: the rack drives, a torque on the pinion asks for T/r on the rack."""
-    data = wheel_and_rack({"S": {"speed": 0.02, "range": [-0.1, 0.1]}})
-    result = brief(Mechanism(**data), 9)
+    result = brief(Mechanism(**wheel_and_rack({"S": {"speed": 0.02, "range": [-0.1, 0.1]}})), 9)
     np.testing.assert_allclose(at(result, "drive_effort", driver="S"), 3.0 / RADIUS, rtol=1e-12)
     np.testing.assert_allclose(at(result, "gear_torque", gear="mesh"), 3.0, rtol=1e-12)
     np.testing.assert_allclose(at(result, "gear_force", "x", gear="mesh"), -3.0 / RADIUS, rtol=1e-12)

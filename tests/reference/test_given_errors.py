@@ -1,7 +1,5 @@
 """Seats that are given, misaligned axes and dimensions off nominal against models changed by hand."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
@@ -39,8 +37,7 @@ def linkage(**joint: Any) -> Data:
     data = copy.deepcopy(rssr(start=START).data)
     data["assembly"] = {"D": 1.3}
     data["joint_defaults"]["pin"] |= {"radius": RADIUS, "bearing": LENGTH}
-    pin = {"offset": OFFSET, "clearance": RHO, **joint.pop("pin", {})}
-    data["joints"]["D"] |= {"pin": pin, **joint}
+    data["joints"]["D"] |= {"pin": {"offset": OFFSET, "clearance": RHO, **joint.pop("pin", {})}, **joint}
     return data
 
 
@@ -93,8 +90,7 @@ def test_given_seat(degrees: tuple[float, float]) -> None:
     data = linkage(seat={"beta": float(beta), "xi": float(xi)})
     result = analysed(data)
     ends = RHO * np.array([[np.cos(a), np.sin(a)] for a in (xi + beta / 2, xi - beta / 2)])
-    moved = by_hand(data, leaned((ends[1] - ends[0]) / LENGTH, ends.mean(axis=0)))
-    last = agrees(result, moved)
+    last = agrees(result, by_hand(data, leaned((ends[1] - ends[0]) / LENGTH, ends.mean(axis=0))))
     at = {name: result[name].sel(joint="D").values[..., -1] for name in
           ("seat_offset", "seat_beta", "seat_xi", "seat_xi_pin", "contact_position")}  # fmt: skip
     np.testing.assert_allclose(at["seat_offset"][:, :2], ends, rtol=0, atol=1e-19)
@@ -227,8 +223,7 @@ def test_planar_mechanisms_with_offsets_in_every_joint(name: str) -> None:
     run = prepare(trunnion.Mechanism(trunnion=1, **data))
     time = run.cycle.times(7)
     one = run.solve(time, values={**run.values, **seats})
-    other_run = prepare(trunnion.Mechanism(trunnion=1, **moved_planar(data, seats, guide)))
-    other = other_run.solve(time)
+    other = prepare(trunnion.Mechanism(trunnion=1, **moved_planar(data, seats, guide))).solve(time)
     for link, motion in one.walk.motions.items():
         for a, b in zip(motion.frame, other.walk.motions[link].frame, strict=True):
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-10)

@@ -1,7 +1,5 @@
 """Joints that lock in motion beside others that move on, several accelerations, and the rest of all free drivers."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from collections.abc import Callable, Sequence

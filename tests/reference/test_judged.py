@@ -1,7 +1,5 @@
 """A slice of `python -m benchmarks.random_mechanisms`, and that its judge sees what it is there to see."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -42,8 +40,7 @@ def test_random_mechanisms(space: str, seeds: Any) -> None:
     """Every solved position keeps every limit, and most positions are solved."""
     found = [examine(space, seed, STEPS, whole=False) for seed in seeds]
     assert not any(one.refused for one in found)
-    over = {one.name: one.worst for one in found if any(one.broken.values())}
-    assert not over
+    assert not {one.name: one.worst for one in found if any(one.broken.values())}
     assert sum(one.statuses[0] for one in found) > 0.6 * STEPS * len(found)
 
 
@@ -86,8 +83,7 @@ def test_every_mechanism_in_space_is_right(name: str, friction: bool) -> None:
 def test_the_judge_sees_a_joint_beside_its_seat() -> None:
     """A seat that is off by a thousandth of its clearance puts reactions, and the pin, where they are not."""
     _, data = planar.seated(2)
-    result = result_of(data, STEPS, whole=False)
-    wrong = judged_planar.judge(data, altered(result, "seat_offset", 1.001))
+    wrong = judged_planar.judge(data, altered(result_of(data, STEPS, whole=False), "seat_offset", 1.001))
     assert wrong.worst("motion")[0] > 1e-4
     assert wrong.worst("balance")[0] > 1e-9
 
@@ -114,8 +110,7 @@ def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> Non
         name = "friction_moment"  # the torque is what the model has, the moment what acts
     seeds = {"planar": 5, "spatial": 6}  # with pins, a slide and friction in all of them
     _, data = DRAWN[space](seeds[space])
-    result = result_of(data, STEPS, whole=False)
-    wrong = JUDGED[space](data, altered(result, name, 1 + 1e-6))
+    wrong = JUDGED[space](data, altered(result_of(data, STEPS, whole=False), name, 1 + 1e-6))
     assert wrong.worst(check)[0] > 1e-8 > CHECKS[check]
 
 

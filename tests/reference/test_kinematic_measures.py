@@ -1,7 +1,5 @@
 """Speeds, angles, dwells, expressions and starting times as measures, against closed forms and differences."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -130,8 +128,7 @@ def slope(run: Run, name: str, time: Any, step: float = 1e-5) -> Any:
 @pytest.mark.slow
 def test_speeds_in_space_by_differences(spatial: Run) -> None:
     mechanism, time = spatial.system.mechanism, np.linspace(0.01, 0.15, 7)
-    points = [f"{link}.{point}" for link, names in mechanism.points.items() for point in names]
-    for point in points:
+    for point in [f"{link}.{point}" for link, names in mechanism.points.items() for point in names]:
         found = [course(spatial, f"velocity:{point}.{axis}", time) for axis in "xyz"]
         for axis, one in zip("xyz", found, strict=True):
             np.testing.assert_allclose(one, slope(spatial, f"{point}.{axis}", time), rtol=1e-6, atol=1e-7)

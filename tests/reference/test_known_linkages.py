@@ -1,7 +1,5 @@
 """Known linkages: what other means say of the examples, published states and figures of the theory sheet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -5,8 +5,6 @@ stroke; a load from the ram's place x₀ on makes it largest there. The angle of
 cos θ = (x₀² + r² − l²)/(2 r x₀). The useful work of a turn is F (r + l − x₀), whatever the way there.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

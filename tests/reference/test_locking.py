@@ -1,7 +1,5 @@
 """Where friction locks: closed forms, a homotopy on the Newton–Euler equations, margins, multiples, the way back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -385,8 +383,7 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
     """Just below it runs, just above it is locked: one joint's coefficient changed, away from reversals."""
     data, options = FRICTIONAL[name]
     steps, coefficient = 12, options["friction"]
-    mechanism = build(data(), **options)
-    run = prepare(mechanism)
+    run = prepare(build(data(), **options))
     time = run.cycle.times(steps) + 0.1 * run.cycle.duration / steps
     found = multiples_at(run, time, MARGIN)
     factors = np.array([1 - 1e-6, 1 + 1e-6])

@@ -1,7 +1,5 @@
 """Locking at every position: a crank against its friction circle in closed form, and what its states agree with."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Means over the cycle, however many positions are asked for, by fine integrals; useful work and work beside it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from math import pi
@@ -199,8 +197,7 @@ def test_power_residual_is_told_of_the_peak_power() -> None:
 def test_root_mean_square_of_an_effort() -> None:
     """Of a crank that lifts a weight the torque is m g r cos φ: its RMS m g r/√2."""
     crank = shaft({"speed": 2.0}, {"mass": 2.0, "centre": [0.3, 0], "inertia": 0.0}, gravity=[0, -9.81])
-    result = trunnion.analyse(crank, 12)
-    (row,) = (row for row in summary_of(result) if row.aspect == "RMS")
+    (row,) = (row for row in summary_of(trunnion.analyse(crank, 12)) if row.aspect == "RMS")
     assert row.value == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)
 
 

@@ -1,7 +1,5 @@
 """Measures and their figures against closed forms, published values and the books of `analyse`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -221,8 +219,7 @@ def test_straightness_of_hoeckens_line() -> None:
 def test_straightness_of_a_circle_and_of_a_line(crank: Run) -> None:
     """As wide as it is long; and the path of the piston, which is straight."""
     pin = Measure("pin", "straightness", "crank.B")
-    piston = Measure("piston", "straightness", "piston.P")
-    found = figures(crank, [pin, piston], 90)
+    found = figures(crank, [pin, Measure("piston", "straightness", "piston.P")], 90)
     assert found["pin"] == pytest.approx(2 * R, rel=1e-6)
     assert found["piston"] == pytest.approx(0, abs=1e-15)
 
@@ -254,8 +251,7 @@ def test_straightness_in_space() -> None:
 def test_locking_margin() -> None:
     """The least of the analysis to where it is looked for; no derivative, rather than a silent 0."""
     run = prepare(build(slider_crank(R, L, E), friction=0.4, radius=0.08))
-    result = trunnion.locking(run.system.mechanism, 90)
-    least = float(np.nanmin(result["locking_margin"].values))
+    least = float(np.nanmin(trunnion.locking(run.system.mechanism, 90)["locking_margin"].values))
     assert least < MARGIN
     margin = Measure("margin", "locking_margin", "mechanism")
     found = figures(run, [margin], 90)["margin"]
@@ -317,7 +313,6 @@ def test_place_of_a_law_that_is_not_steady() -> None:
     """The time at which a rise has a coordinate, and the coordinate at which the slide is shortest."""
     rise = {"law": "cycloidal", "range": [2.0, 4.4], "duration": 2.0, "returns": False}
     run = prepare(build({**slider_crank(R, L, E), "drivers": {"A": rise}}))
-    at = Measure("at", "rotation", "A", at=2.7)
-    found = figures(run, [at, NEAR], 360)
+    found = figures(run, [Measure("at", "rotation", "A", at=2.7), NEAR], 360)
     assert found["at"] == pytest.approx(2.7, abs=1e-13)
     assert found["near"] == pytest.approx(near_of(), abs=1e-9)

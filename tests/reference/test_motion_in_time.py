@@ -1,7 +1,5 @@
 """Motion in time against closed forms, published solutions and MuJoCo: motors, clutches, controllers, linkages."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -73,8 +71,7 @@ def test_a_flywheel_runs_down(grease: float, time: float, angle: float) -> None:
 def test_an_induction_motor_runs_up_by_kloss() -> None:
     """Without a load the time to a slip is J ω_s/(2 T_k) ∫ (s/s_k + s_k/s) ds."""
     motor = {"kind": "induction", "breakdown_effort": 20, "breakdown_slip": 0.2, "synchronous_speed": 50 * np.pi}
-    times = np.array([0.39537521522134894, 0.5344413770648673])
-    for time, slip in zip(times, (0.5, 0.2), strict=True):
+    for time, slip in zip(np.array([0.39537521522134894, 0.5344413770648673]), (0.5, 0.2), strict=True):
         result = simulate(wheel(motor, drag=0.0), time, 1, 1e-12)
         assert 1 - at(result, "drive_rate", time) / (50 * np.pi) == pytest.approx(slip, rel=1e-9)
 
@@ -111,8 +108,7 @@ def test_a_motor_too_weak_stalls() -> None:
 
 def test_a_gear_a_rotor_and_a_loss() -> None:
     """(J + i² J_r η) ω̇ = i η T − T_f: ω = ω∞ (1 − e^(−t/τ))."""
-    motor = {**LINEAR, "ratio": 3, "efficiency": 0.9, "inertia": 0.002}
-    result = simulate(wheel(motor), 0.5, 1, 1e-12)
+    result = simulate(wheel({**LINEAR, "ratio": 3, "efficiency": 0.9, "inertia": 0.002}), 0.5, 1, 1e-12)
     whole = 0.05 + 9 * 0.002 * 0.9
     slope, start = 3 * 0.9 * 4 * 3 / 150, 3 * 0.9 * 4 - 0.6
     assert at(result, "drive_rate", 0.5) == pytest.approx(start / slope * (1 - np.exp(-slope * 0.5 / whole)), rel=1e-10)
@@ -267,18 +263,15 @@ def test_a_short_load_in_time_is_not_stepped_over() -> None:
     data = wheel(None, drag=0.0, initial={"speed": 2.0}).data()
     data["links"]["wheel"]["inertia"] = 0.1
     data["loads"] = {"pulse": {"link": "wheel", "moment": "10 N m * between(time, 7.1 s, 7.12 s)"}}
-    result = simulate(Mechanism(**data), 10.0, 10)
-    assert at(result, "drive_rate", 10.0) == pytest.approx(4.0, rel=1e-9)
+    assert at(simulate(Mechanism(**data), 10.0, 10), "drive_rate", 10.0) == pytest.approx(4.0, rel=1e-9)
 
 
 def test_a_gear_that_cannot_be_driven_back_holds_its_load() -> None:
     """Between η T and T/η of the load the motor neither lifts nor lowers it."""
-    motor = {"kind": "constant", "effort": 1.0, "efficiency": 0.5}
-    data = wheel(motor, drag=0.0).data()
+    data = wheel({"kind": "constant", "effort": 1.0, "efficiency": 0.5}, drag=0.0).data()
     for moment, moves in ((-0.4, True), (-0.6, False), (-1.9, False), (-2.1, True)):
         data["loads"] = {"weight": {"link": "wheel", "moment": moment}}
-        result = simulate(Mechanism(**data), 1.0, 4)
-        assert (at(result, "drive_rate", 1.0) != 0.0) == moves
+        assert (at(simulate(Mechanism(**data), 1.0, 4), "drive_rate", 1.0) != 0.0) == moves
 
 
 def test_a_controller_does_not_wind_up_at_rest() -> None:
@@ -506,8 +499,7 @@ def test_a_start_with_a_motor_is_mujocos() -> None:
     driver = {"O": {"speed": 100, "start": 1.0, "motor": motor}}
     load = {"work": {"link": "piston", "at": "Q", "force": [-PULL, 0]}}
     result = simulate(Mechanism(**{**SLIDER_CRANK, "drivers": driver, "loads": load}), 0.4, 4, 1e-10)
-    times = result["time"].values
-    wanted = by_engine((1.0, 0.0), times)
+    wanted = by_engine((1.0, 0.0), result["time"].values)
     assert result["drive_coordinate"].values[0] == pytest.approx(wanted[0], rel=1e-6)
     assert result["drive_rate"].values[0] == pytest.approx(wanted[1], rel=1e-6)
     assert wanted[0, -1] > 4 * np.pi

@@ -1,7 +1,5 @@
 """Whole mechanisms in MuJoCo, which has a motion and forces of its own; in space without friction."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

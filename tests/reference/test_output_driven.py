@@ -1,7 +1,5 @@
 """Motion stated at one joint, effort at another: against closed forms, virtual work and the way in two runs."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

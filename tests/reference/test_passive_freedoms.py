@@ -1,7 +1,5 @@
 """Struts between balls, pads under balls: their spins move nothing else, and statics says what they carry."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Brute force moves the pins in their holes and closes the mechanism exactly: `played.changes`.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -46,8 +44,7 @@ NOW = np.zeros(1)
 def test_four_bar(joint: str) -> None:
     """0.02 mm in any one joint turns the rocker by up to 0.017902° at 60°: the links carry one force, 1/(c sin μ)."""
     mechanism = four_bar(joint)
-    result = trunnion.play(mechanism, steps=6)
-    at = result.isel(position=0)
+    at = trunnion.play(mechanism, steps=6).isel(position=0)
     assert np.degrees(float(at["value"].item())) == pytest.approx(95.195700, abs=1e-6)
     assert np.degrees(float(at["worst_case"].item())) == pytest.approx(0.017902, abs=5e-7)
     assert float(at["deviation"].item()) == pytest.approx(float(at["worst_case"].item()) / 2, rel=1e-12)  # a disc

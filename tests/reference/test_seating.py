@@ -1,7 +1,5 @@
 """Loaded seats of whole linkages against oracles that share nothing with Trunnion, and against closed forms."""
 
-from __future__ import annotations
-
 import copy
 import json
 from typing import Any
@@ -206,8 +204,7 @@ def test_rates_are_the_derivatives_of_the_offsets(name: str) -> None:
 @pytest.mark.slow
 def test_pins_lie_at_their_walls_between_many_bends() -> None:
     """Seats of four pins that bend in more places than most: none is the polynomial of a panel that is too wide."""
-    run = prepare(trunnion.Mechanism(**planar.seated(90022)[1]))
-    seating = seating_of(run)
+    seating = seating_of(prepare(trunnion.Mechanism(**planar.seated(90022)[1])))
     panels = seating.courses.states == SETTLED
     offsets = seating.courses.on_nodes(panels)
     between = seating.courses.coefficients[panels] @ ON_GRID

@@ -1,7 +1,5 @@
 """Friction in space against closed forms and the plane: Cardan joint, screw, hinges of a door, coupled wheels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

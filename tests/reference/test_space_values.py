@@ -1,7 +1,5 @@
 """Motion in space against closed forms and published numbers, and the chain of three cylindrical joints by itself."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

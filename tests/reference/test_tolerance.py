@@ -1,7 +1,5 @@
 """Tolerances to first order, worst cases and RSS: known numbers, closed forms of their own, derivatives, corners."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -106,8 +104,7 @@ def test_sums_of_first_order(results: dict[str, Any], name: str) -> None:
     """|S| t of each, their sum, the root of the sum of their squares; shares that add up to one."""
     result = results[name]
     _, of, at = CASES[name]
-    widths = result["parameter_upper"].values
-    changes = np.abs(slopes(of, at, 3e-5)) * widths
+    changes = np.abs(slopes(of, at, 3e-5)) * result["parameter_upper"].values
     np.testing.assert_allclose(result["contribution_worst_case"].values[0], changes, rtol=1e-8, atol=1e-15)
     assert result["worst_case_upper"].item() == pytest.approx(np.sum(changes), rel=1e-8)
     assert result["worst_case_lower"].item() == pytest.approx(-np.sum(changes), rel=1e-8)

@@ -1,7 +1,5 @@
 """Figures of a study at their edge: what first order cannot know, what does not exist, what no model may have."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -147,8 +145,7 @@ def made(**limits: Any) -> dict[str, Any]:
     ],
 )
 def test_what_is_outside_the_limits(limits: dict[str, Any], methods: list[str], told: tuple[str, ...]) -> None:
-    found = trunnion.tolerance(fourbar(**made(**limits)), methods=methods, samples=2000)
-    rows = missed(found)
+    rows = missed(trunnion.tolerance(fourbar(**made(**limits)), methods=methods, samples=2000))
     assert bool(rows) == bool(told)
     for word in told:
         assert word in rows[0]["what"]

@@ -1,7 +1,5 @@
 """Random samples against closed forms on the same and on other random numbers; intervals against true figures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Samples analysed together in batches against each of them built as a mechanism of its own and analysed alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -37,8 +35,7 @@ def planar(name: str, **options: Any) -> Callable[[], Data]:
 
 def spatial(name: str) -> Callable[[], Data]:
     def data() -> Data:
-        found = mechanisms_space.MODELS[name]().data
-        return found | {"joint_defaults": {"friction": 0.05}}
+        return mechanisms_space.MODELS[name]().data | {"joint_defaults": {"friction": 0.05}}
 
     return data
 

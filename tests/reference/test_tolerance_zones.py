@@ -3,8 +3,6 @@
 Against closed forms of the same linkages, and against samples of these that are drawn here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

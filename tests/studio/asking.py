@@ -1,7 +1,5 @@
 """Questions to the studio as the page asks them, and what `analyse` has of the same models."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path

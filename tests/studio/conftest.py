@@ -3,8 +3,6 @@
 Where there is no browser, its tests are left out: what must hold everywhere is tested without one.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from browsing import CHROMIUM, QUIET, User

@@ -1,7 +1,5 @@
 """Questions of the studio's page and their answers, without a server."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.studio import chain
@@ -76,8 +74,7 @@ def test_a_model_reads_no_other_file():
 
 def test_the_cycle_is_that_of_analyse():
     found = ask(ask="model", text=EXAMPLES[FOURBAR])
-    mechanism = model_of(EXAMPLES[FOURBAR])
-    result = trunnion.analyse(mechanism, 360)
+    result = trunnion.analyse(model_of(EXAMPLES[FOURBAR]), 360)
     (driver,) = found["scene"]["drivers"]
     np.testing.assert_allclose(driver["effort"], result.drive_effort.values[0], rtol=6e-7)
     assert found["margin_least"]["beyond"]
@@ -124,8 +121,7 @@ def test_a_name_is_changed_wherever_it_stands():
     for what, new in ((["links", "coupler"], "rod"), (["joints", "C"], "K"), (["dimensions", "BC"], "length")):
         text, _ = edited(text, {}, {"do": "rename", "what": what, "to": new})
     assert not {"coupler", "BC"} & set(str(entries_of(text)[0]).replace("'", " ").split())
-    after = analysed(text, 36)
-    np.testing.assert_allclose(after.drive_effort, before.drive_effort, rtol=1e-12)
+    np.testing.assert_allclose(analysed(text, 36).drive_effort, before.drive_effort, rtol=1e-12)
     assert len(text.splitlines()) == len(EXAMPLES[FOURBAR].splitlines())  # and what is on each, in its place
     assert "\n  AB: 2.00 m\n  length: 6.00 m\n  CD: 3.00 m\n" in text
     assert (
@@ -156,8 +152,7 @@ def test_links_of_three_joints_keep_the_others(joint):
 
     before = places(scene["points"])
     to = np.add(before[joint], [0.01, -0.007])
-    found = ask(ask="drag", text=text, point=joint, index=index, to=list(to))
-    after = places(found["points"])
+    after = places(ask(ask="drag", text=text, point=joint, index=index, to=list(to))["points"])
     for name, place in before.items():
         np.testing.assert_allclose(
             after[name], to if place == pytest.approx(before[joint]) else place, atol=1e-6, err_msg=name
@@ -195,8 +190,7 @@ def test_a_number_that_is_tried_gives_the_cycle_of_a_model_that_has_it(name, pat
         text = text.replace(old, new)
     mechanism = model_of(text)
     result = trunnion.analyse(mechanism if friction == "stated" else mechanism.with_friction("off"), 360)
-    shown = ask(ask="model", text=text, friction=friction)
-    scene = shown["scene"]
+    scene = ask(ask="model", text=text, friction=friction)["scene"]
     for index in (0, 100, 250):
         tried = ask(ask="try", text=EXAMPLES[name], values={path: value}, index=index, friction=friction)
         margin, least = tried["margin"], float(result["locking_margin"][index])
@@ -254,8 +248,7 @@ def test_a_guide_goes_across_and_the_rod_along():
     text = EXAMPLES["slider-crank"]
     names = {one["type"]: one for one in ask(ask="model", text=text)["scene"]["joints"]}
     slide = names["prismatic"]["name"]
-    before = ask(ask="model", text=text)["places"]
-    spot = np.array(before[names["prismatic"]["at"]])
+    spot = np.array(ask(ask="model", text=text)["places"][names["prismatic"]["at"]])
     found = ask(ask="drag", text=text, point=slide, index=0, to=[spot[0] + 0.001, spot[1] + 0.002])
     assert "error" not in found, found
     moved = [found["points"][names["prismatic"]["at"]][axis][0] for axis in "xy"]
@@ -270,8 +263,7 @@ def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
     )
     places = {"ground.A": [0, 0], "bar.A": [0, 0], "bar.B": [size, 0]}
     text, places = edited(text, places, {"do": "link", "from": "bar.B", "to": [1.5 * size, 0]})
-    stated = entries_of(text)[0]["links"]["link1"]["points"]["C"][0]
-    number, written = stated.split()
+    number, written = entries_of(text)[0]["links"]["link1"]["points"]["C"][0].split()
     assert (float(number) * factor, written) == (pytest.approx(0.5 * size), unit)
     text, _ = edited(text, places, {"do": "add-point", "link": "bar", "at": [0.5 * size, 0.0]})
     assert entries_of(text)[0]["links"]["bar"]["points"]["D"][0].endswith(f" {unit}")  # and so it stays
@@ -377,9 +369,7 @@ def test_friction_that_is_not_whole_leaves_the_motion():
 def test_of_many_joints_the_forces_are_those_of_the_position_that_is_shown(index):
     """A chain of 82 links: its paths are there, thinned, and its forces are those of the model that has the number."""
     text = chain(40)
-    changed = text.replace("b: 140 mm", "b: 141 mm")
-    shown = ask(ask="model", text=changed)
-    scene = shown["scene"]
+    scene = ask(ask="model", text=text.replace("b: 140 mm", "b: 141 mm"))["scene"]
     tried = ask(ask="try", text=text, values={"dimensions.b": 0.141}, index=index)
     assert tried["index"] == index
     assert tried["status"] == [scene["status"][index]]
@@ -393,8 +383,7 @@ def test_of_many_joints_the_forces_are_those_of_the_position_that_is_shown(index
         for axis in "xy":
             live = tried["joints"][joint["name"]][axis]
             assert live == pytest.approx([joint["reaction"][axis][index]], abs=1e-6 * size)
-    places = sum(len(track["x"]) for track in tried["tracks"].values())
-    assert places <= 20_000
+    assert sum(len(track["x"]) for track in tried["tracks"].values()) <= 20_000
     assert {"rocker0.B0", "rocker39.B39"} <= tried["tracks"].keys()
     assert not any(key.endswith(".C3") for key in tried["tracks"])  # a pin on the ground goes nowhere
 
@@ -413,8 +402,7 @@ def test_what_is_tried_or_dragged_in_space_is_the_model_that_has_it():
     way = {"point": "A", "index": 10, "by": [0.0, 0.0, 0.002]}
     dragged = ask(ask="drag", text=text, **way)
     moved, _ = edited(text, {}, {"do": "move", "size": 0.2, **way})
-    after = ask(ask="model", text=moved)
-    links = {link["name"]: link["pose"] for link in after["scene"]["links"]}
+    links = {link["name"]: link["pose"] for link in ask(ask="model", text=moved)["scene"]["links"]}
     for link in dragged["scene"]["links"]:
         for axis in "xyz":
             np.testing.assert_allclose(column(link["pose"][axis]), column(links[link["name"]][axis]), atol=2e-5)

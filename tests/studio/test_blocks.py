@@ -1,7 +1,5 @@
 """The mechanism as blocks: what passes their wires is that of `analyse`; built of blocks it is the drawn one."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -23,8 +21,7 @@ def test_what_passes_the_wires_is_what_the_groups_give(name):
     found, result = sound("blocks", EXAMPLES[name]), analysed(EXAMPLES[name])
     result = without_noise(result)
     inner = [joint for block in found["blocks"] for joint in block.get("inner", [])]
-    wired = [wire["joint"] for wire in found["wires"]]
-    assert sorted(inner + wired) == sorted(result["joint"].values)
+    assert sorted(inner + [wire["joint"] for wire in found["wires"]]) == sorted(result["joint"].values)
     layout = json.loads(result.attrs["scene"])["joints"]
     for wire in found["wires"]:
         assert wire["from"] < wire["to"]
@@ -129,8 +126,7 @@ def test_a_driver_and_a_ccc_are_a_cardan_joint(angle, first):
     ratio = np.cos(delta) / (1 - np.sin(delta) ** 2 * np.cos(theta) ** 2)
     np.testing.assert_allclose(rates[1] / rates[0], ratio, **near)
     assert sound("model", text)["findings"] == []
-    again = ask(ask="edit", text=text, places={}, gestures=blocks)
-    assert "closes a loop in space" in again["error"]
+    assert "closes a loop in space" in ask(ask="edit", text=text, places={}, gestures=blocks)["error"]
 
 
 def test_groups_with_two_slides_and_of_class_three_move_as_their_closed_forms():

@@ -1,7 +1,5 @@
 """Errors and play as the studio draws them, against `analyse`, closed forms and the verb that tells of tolerances."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -179,8 +177,7 @@ def test_in_space_errors_are_magnified_beside_the_ideal_mechanism(user):
     user.page.click("role=tab[name=Plots]")
     user.page.click("summary:has-text('Pins in their holes')")
     user.page.wait_for_selector(".seat figcaption")
-    ends = user.page.locator(".seat figcaption .title")
-    assert ends.all_text_contents() == ["D, end 1", "D, end 2"]
+    assert user.page.locator(".seat figcaption .title").all_text_contents() == ["D, end 1", "D, end 2"]
     result = analysed(EXAMPLES["rssr-with-play"]).sel(joint="D").isel(position=0)
     for end in (0, 1):
         load = float(np.linalg.norm(np.nan_to_num(result["end_force"].isel(end=end))))

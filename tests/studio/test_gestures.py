@@ -1,7 +1,5 @@
 """What is drawn by hand: slots, gear pairs, ends on links, locks, names; against closed forms where there is motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -47,8 +45,7 @@ def test_the_forces_on_a_block_balance_with_the_friction_of_its_guide():
     pin, guide = ({one["name"]: one for one in shown["joints"]}[name] for name in ("B", "E"))
     angle = np.array(next(one["angle"] for one in shown["links"] if one["name"] == "link2"))
     known = np.array(shown["status"]) == 0
-    along = {"x": np.cos(angle), "y": np.sin(angle)}
-    for axis, part in along.items():
+    for axis, part in {"x": np.cos(angle), "y": np.sin(angle)}.items():
         total = np.array(pin["reaction"][axis]) + np.array(guide["reaction"][axis]) + part * np.array(guide["friction"])
         np.testing.assert_allclose(total[known], 0.0, atol=1e-3)
     assert np.abs(np.array(guide["friction"])[known]).max() > 20.0

@@ -1,7 +1,5 @@
 """What the studio's page keeps and saves, in a real browser: no work is lost, and none becomes that of another file."""
 
-from __future__ import annotations
-
 import pytest
 
 from browsing import User
@@ -130,8 +128,7 @@ def test_a_browser_that_does_not_know_the_token_is_told_so(browser, studio):
 
 @pytest.mark.slow
 def test_the_token_goes_to_no_other_port(tabs):
-    user = tabs(tabs.studio.entrance())
-    assert "once=" not in user.page.url
+    assert "once=" not in tabs(tabs.studio.entrance()).page.url
     assert tabs.context.cookies() == []
     again = tabs(f"http://127.0.0.1:{tabs.studio.port}/")  # another tab of the browser that was let in
     assert again.state("s.text.value") == FOURBAR

@@ -1,7 +1,5 @@
 """What the studio lays over sheet and plots, and what locks; against `analyse`, closed forms and differences."""
 
-from __future__ import annotations
-
 import re
 from itertools import combinations
 
@@ -160,8 +158,7 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
 def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
     """Ram in line with the lever's pivot: φ = 2 acos(d/r) of the crank, the shorter way, stands about 270°."""
     after = EXAMPLES["whitworth-quick-return"]
-    before = after.replace("d: 60 mm", "d: 40 mm")
-    _, rows = compared(before, after, steps=60)
+    _, rows = compared(after.replace("d: 60 mm", "d: 40 mm"), after, steps=60)
     assert rows["time ratio of G"]["b"] == pytest.approx(2.0, rel=1e-4)
     short = 2 * np.arccos(40 / 120)
     assert rows["time ratio of G"]["a"] == pytest.approx((2 * np.pi - short) / short, rel=1e-4)
@@ -217,8 +214,7 @@ def test_the_margin_does_not_jump_where_a_joint_turns_round(name, index):
     text = EXAMPLES[name]
     found, cycle = (ask(ask=kind, text=text) for kind in ("model", "cycle"))
     margin = np.array(found["margin"], float)
-    sides = np.array([np.roll(margin, 1), np.roll(margin, -1)])
-    assert np.all(margin <= 1.05 * sides.max(axis=0))
+    assert np.all(margin <= 1.05 * np.array([np.roll(margin, 1), np.roll(margin, -1)]).max(axis=0))
     rough, stated = re.sub(r"friction: 0\.\d+", "friction: 0.2", text), float(re.search(r"friction: (0\.\d+)", text)[1])
     live = ask(ask="try", text=rough, values={}, index=index)["margin"]
     assert live == {"value": pytest.approx(margin[index] * stated / 0.2, rel=1e-6), "beyond": False}

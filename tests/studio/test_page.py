@@ -1,7 +1,5 @@
 """The page in a real browser: drawn, dragged, played, typed, exported, reloaded and saved; and who else asks."""
 
-from __future__ import annotations
-
 import json
 import time
 from pathlib import Path
@@ -35,8 +33,7 @@ def test_a_four_bar_drawn_by_mouse_is_driven_rubbed_saved_and_opened_again(user)
     user.page.wait_for_timeout(700)
     user.idle()
     assert user.state("s.text.value") == rubbing
-    result = analysed(rubbing)
-    torque = result["drive_effort"].values[0]
+    torque = analysed(rubbing)["drive_effort"].values[0]
     assert abs(efforts(user)[60] - torque[60]) <= PEAK * np.abs(torque).max()
     user.page.click("summary:has-text('File')")
     user.page.click("button:has-text('Save as')")
@@ -237,8 +234,7 @@ def test_hostile_models_do_not_freeze_the_page(user):
 def test_a_slider_changes_the_mechanism_as_it_is_pulled_and_the_file_as_it_is_released(user):
     text, torque = user.state("s.text.value"), user.page.locator(".readout div:has-text('torque A') dd")
     before = torque.text_content()
-    slider = user.page.get_by_label("BC, slider")
-    box = slider.bounding_box()
+    box = user.page.get_by_label("BC, slider").bounding_box()
     user.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     user.page.mouse.down()
     for step in range(8):
@@ -248,9 +244,7 @@ def test_a_slider_changes_the_mechanism_as_it_is_pulled_and_the_file_as_it_is_re
     assert user.state("s.text.value") == text
     live = torque.text_content()
     assert live != before
-    arrow = "document.querySelectorAll('.layer.vectors path')[1].getAttribute('d')"
-    pulled = user.page.evaluate(arrow)
-    assert pulled
+    assert user.page.evaluate("document.querySelectorAll('.layer.vectors path')[1].getAttribute('d')")
     assert "here" in user.page.locator(".bar.bottom .margin").inner_text()
     user.page.mouse.up()
     user.until("s.live.value === null && s.past.value.length === 1 && s.answer.value.text === s.text.value")
@@ -278,8 +272,7 @@ def test_one_question_of_a_drag_is_under_way_and_the_newest_is_asked_next(user):
     def sent(question):
         if question["ask"] == "drag":
             asked.append(question["to"])
-            under_way = sum(1 if one else -1 for one in asked)
-            most[0] = max(most[0], under_way)
+            most[0] = max(most[0], sum(1 if one else -1 for one in asked))
 
     user.page.on("websocket", watch)
     user.page.reload()

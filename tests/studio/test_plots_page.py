@@ -3,8 +3,6 @@
 Every test fails on an error of the page, on one in its console, and on a request to anywhere but this machine.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -132,8 +130,7 @@ def test_curves_are_chosen_over_another_and_the_table_of_joints_has_the_largest(
     for name in ("coupler.angle_velocity", "rocker.angle_velocity"):
         page.get_by_label("Curve to add").press_sequentially(name)  # though rocker.angle is a column too
         page.keyboard.press("Enter")
-    chart = page.locator(".own-curves figure")
-    chart.wait_for()
+    page.locator(".own-curves figure").wait_for()
     page.locator(".own-curves path.curve").nth(1).wait_for(state="attached")
     page.get_by_label("Over", exact=True).fill("rocker.angle")
     page.get_by_label("Over", exact=True).press("Enter")

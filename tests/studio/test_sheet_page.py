@@ -1,7 +1,5 @@
 """Linkages drawn, joined, chosen, copied and mirrored on the sheet, with the mouse, by keyboard and by fingers."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -127,12 +125,10 @@ def test_a_watt_six_bar_closed_by_joins_is_the_typed_one(user, by):
     pivot = user.state(
         "Object.keys(s.answer.value.entries.links.ground.points)[2]",
     )
-    load = {"do": "load", "against": pivot, "size": "6 N m"}
-    user.of("actions", "m.edit(given)", [load, rubbing])
+    user.of("actions", "m.edit(given)", [{"do": "load", "against": pivot, "size": "6 N m"}, rubbing])
     drawn, typed = effort(user.state("s.text.value")), effort(TYPED)
     np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
-    steps = user.state("s.past.value.length")
-    for _ in range(steps):
+    for _ in range(user.state("s.past.value.length")):
         user.of("actions", "m.undo()")
     user.idle()
     assert user.state("s.text.value") == ""
@@ -149,8 +145,7 @@ def test_a_watt_six_bar_closed_by_joins_is_the_typed_one(user, by):
 def test_a_mass_centre_is_dragged_with_the_forces_of_where_it_is(user):
     """By mouse, arrow key and finger; the crank lies along x: its frame is that of the sheet."""
     hand = Hand(user, "mouse")
-    numbers = user.state("s.answer.value.numbers")
-    assert numbers["links.crank.centre.x"] == 1.0
+    assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == 1.0
     x, y = hand.at((1.0, 0.0))
     user.page.mouse.move(x, y)
     user.page.mouse.down()
@@ -168,8 +163,7 @@ def test_a_mass_centre_is_dragged_with_the_forces_of_where_it_is(user):
     mark.focus()
     user.keys("ArrowRight")
     assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.2 + step)
-    finger = Hand(user, "touch")
-    finger.drag((1.2 + step, 0.3), (1.0, 0.0))
+    Hand(user, "touch").drag((1.2 + step, 0.3), (1.0, 0.0))
     assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.0)
     assert user.state("s.past.value.length") == 3
 
@@ -269,8 +263,7 @@ def test_a_first_mechanism_is_drawn_step_by_step(user):
         user.page.locator(".sheet > svg").focus()
         user.page.keyboard.press(key)
         assert user.page.locator(".ring").count() == count
-        spots = [user.page.locator(".ring circle").nth(k).bounding_box() for k in range(count)]
-        for one in spots:
+        for one in [user.page.locator(".ring circle").nth(k).bounding_box() for k in range(count)]:
             user.page.mouse.move(one["x"] + 13, one["y"] + 13)
             user.page.mouse.click(one["x"] + one["width"] / 2, one["y"] + one["height"] / 2)
             user.idle()

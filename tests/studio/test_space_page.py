@@ -1,7 +1,5 @@
 """Mechanisms in space in the studio's page: choosing, moving, layers, table of a loop; numbers against `analyse`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Studies started from the page: the verbs of the command line, with their options, figures and reports."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A Whitworth with a ram, as a user draws it: loads, dimensions, its animation; in the page by keys."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The studio in a cell of a notebook: the kernel answers the page, and follows what is done there."""
 
-from __future__ import annotations
-
 import base64
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The same bits from one process, from several and from a Dask cluster, whatever dies or stops."""
 
-from __future__ import annotations
-
 import json
 import logging
 import multiprocessing

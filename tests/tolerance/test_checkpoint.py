@@ -1,7 +1,5 @@
 """A checkpoint is used for its own job, or refused in one sentence; a stopped study goes on to the last bit."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random

@@ -1,7 +1,5 @@
 """Studies of tolerances: at the edge, of pins in seats, and what they say beside their figures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -99,8 +97,7 @@ def test_few_samples(method: str, samples: int) -> None:
 
 def test_limits_of_a_measure_over_the_turn() -> None:
     """Its largest |deviation| is the figure; limits hold of the signed deviation at every position."""
-    measures = {"angle": {"angle": "rocker", "limit": "+0.06/-0.1 deg"}}
-    found, batch = many(fourbar(measures=measures), 500)
+    found, batch = many(fourbar(measures={"angle": {"angle": "rocker", "limit": "+0.06/-0.1 deg"}}), 500)
     part = batch.figures(uniforms(1, 0, 4, 500), 500)
     figures, passed = part["figure"], part["passed"]
     assert found.orders[0].nominal == 0
@@ -182,8 +179,7 @@ def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
     found = trunnion.tolerance(press(), methods=["linear", "worst-case", "monte-carlo"], samples=24, jobs=1)
     closed = np.array([1 / np.cos(ALPHA)] * 3 + [2 * np.tan(ALPHA)])
     names = [f"joints.{name}.pin.clearance" for name in PLAYS]
-    sensitivity = found.sensitivity.sel(parameter=names).values[0]
-    assert sensitivity == pytest.approx(closed, abs=5e-6)
+    assert found.sensitivity.sel(parameter=names).values[0] == pytest.approx(closed, abs=5e-6)
     worst = 1e-5 * np.sum(closed)
     assert found.worst_case_upper.values[0] == pytest.approx(worst, rel=1e-3)
     assert found.searched_upper.values[0] == pytest.approx(worst, rel=1e-3)

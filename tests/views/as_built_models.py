@@ -1,7 +1,5 @@
 """Mechanisms with errors for the views: seats that follow the load, one that is given, errors of dimensions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Results that the tests of the views share."""
 
-from __future__ import annotations
-
 import pytest
 from stand_in import NASTY, four_bar, slider
 
@@ -20,8 +18,7 @@ def ideal():
 
 def _two_drivers():
     """As a result of two drivers would look: the second drive is another column."""
-    one = four_bar(90)
-    return one.isel(driver=[0, 0]).assign_coords(driver=["A", "D"])
+    return four_bar(90).isel(driver=[0, 0]).assign_coords(driver=["A", "D"])
 
 
 CASES = {

@@ -1,7 +1,5 @@
 """What a figure shows, as the tests of the views ask it: curves, legends, texts, and what lies beyond its edge."""
 
-from __future__ import annotations
-
 from matplotlib.axis import Tick
 from matplotlib.text import Text
 

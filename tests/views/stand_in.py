@@ -1,7 +1,5 @@
 """Results of two mechanisms as a view must bear them: with gaps, one position, odd names, a sliding drive."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Spatial results of every kind that a view must bear: an RSSR, a Cardan joint, chains with a joint of every pair."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

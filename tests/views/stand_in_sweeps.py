@@ -1,7 +1,5 @@
 """Sweeps made by hand, for what their figures and tables must bear: any number of names, gaps, odd values and units."""
 
-from __future__ import annotations
-
 import json
 from itertools import product
 

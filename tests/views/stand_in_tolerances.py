@@ -1,7 +1,5 @@
 """Results of `tolerance` of a four-bar whose rocker may be off by 0.1°: every kind that a view must bear."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors and seats: figures, scene and tables; magnified in the page; none without what they need."""
 
-from __future__ import annotations
-
 import re
 import shutil
 
@@ -28,8 +26,7 @@ def cardan():
 
 @pytest.mark.slow
 def test_errors_are_those_of_the_result(slider):
-    figure = figure_of(slider, "error")
-    place, slide = figure.axes
+    place, slide = figure_of(slider, "error").axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
     assert line(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
     assert place.get_ylabel() == "position error [µm]"
@@ -82,8 +79,7 @@ def _without_errors():
 @pytest.mark.slow
 def test_a_link_in_space_is_moved_turned_and_stretched_to_its_errors(misaligned):
     """The mean shift, the turn about the middle and the stretch of each point add up to the error of that point."""
-    built = scene(misaligned)["built"]
-    for link, told in built["links"].items():
+    for link, told in scene(misaligned)["built"]["links"].items():
         shift, turn = (np.array([_full(told[what][axis], 72) for axis in "xyz"]) for what in ("shift", "turn"))
         own = [key for key in misaligned.point.values if key.split(".")[0] == link]
         errors = np.array([misaligned.point_error.sel(point=key).transpose("axis", "position").values for key in own])

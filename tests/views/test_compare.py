@@ -1,7 +1,5 @@
 """Figures, tables and the report of a comparison; the verb, from files of the virtual rig."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -121,8 +119,7 @@ def test_files_at_hand_are_hashed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run-1.csv").write_bytes(b"t,T\n")
     found = json.loads(trunnion.rig.compare(rocker(), measured()).attrs["files"])
-    digest = hashlib.sha256(b"t,T\n").hexdigest()
-    assert found == [{"file": "run-1.csv", "bytes": 4, "sha256": digest}]
+    assert found == [{"file": "run-1.csv", "bytes": 4, "sha256": hashlib.sha256(b"t,T\n").hexdigest()}]
 
 
 def test_names_are_text():

@@ -1,7 +1,5 @@
 """Report and figures of a motion in time: events, what came in and what is left, joints in play, spectra."""
 
-from __future__ import annotations
-
 import functools
 import json
 import math
@@ -115,8 +113,7 @@ def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     assert motion.events[-1].time == pytest.approx(motion.end, rel=1e-12)
     assert motion.early
     assert np.isfinite(motion.rows["drive_rate"].values).all()
-    words = " ".join(Page(report(result)).words)
-    assert "then the motion ends" in words
+    assert "then the motion ends" in " ".join(Page(report(result)).words)
 
 
 def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
@@ -162,8 +159,7 @@ if NODE:
     @pytest.mark.spread(0, "ends early")
     def test_the_page_draws_it(motion: tuple[str, xr.Dataset], tmp_path: Path) -> None:
         name, result = motion
-        seen = page(result, tmp_path)
-        told = seen["motion"]
+        told = page(result, tmp_path)["motion"]
         ends = "Larger load on an end of bearing or guide"
         wanted = {
             "start": ["Speed", "Drive torque O", "Works and energies", "Joint reactions, magnitude", ends,
@@ -200,10 +196,8 @@ def rattled() -> xr.Dataset:
 
 
 def test_the_path_of_the_pin_lies_in_its_hole() -> None:
-    made = figure_of(rattled(), "orbit")
-    (axes,) = made.axes
-    lines = {len(line.get_xdata()): line for line in axes.lines}
-    (wall,), path = axes.patches, lines[701]
+    (axes,) = figure_of(rattled(), "orbit").axes
+    (wall,), path = axes.patches, {len(line.get_xdata()): line for line in axes.lines}[701]
     assert wall.get_radius() == pytest.approx(500.0)  # µm
     assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.3)
     assert "45.8" in axes.get_title(loc="left")

@@ -87,8 +87,7 @@ def test_what_grows_without_bound_at_a_dead_centre_is_cut_there_and_shown_on_dem
 
 def test_a_load_that_works_next_to_a_dead_centre_is_shown():
     """What rises a hundredfold where the condition has only begun to grow is no dead centre."""
-    share = np.append(np.ones(99), 0.8)
-    assert usual_peak(share, np.append(np.ones(99), 1000.0)) == 1000.0
+    assert usual_peak(np.append(np.ones(99), 0.8), np.append(np.ones(99), 1000.0)) == 1000.0
     assert usual_peak(np.append(np.ones(99), 0.01), np.append(np.ones(99), 1000.0)) == 1.25
 
 

@@ -1,7 +1,5 @@
 """Figures over the drive: every kind of result, its numbers, units, gaps, places, peaks, locking; written whole."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -105,8 +103,7 @@ def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
         "swing": {"angle": "rod"},
     }
     result = trunnion.analyse(trunnion.Mechanism(**data), 36)
-    figure = figure_of(result, "measures")
-    slide, angle = figure.axes
+    slide, angle = figure_of(result, "measures").axes
     assert slide.get_ylabel() == "slide of S [mm]"
     assert angle.get_ylabel() == "swing [°]"
     assert line(slide, "slide of S").get_ydata()[:-1] == pytest.approx(1e3 * result["measure_value"].values[0])
@@ -161,8 +158,7 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
 
 def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     """Ends of the shaded ranges are those found between the positions."""
-    hoist = trunnion.Mechanism.model_validate(HOIST)
-    found = trunnion.locking(hoist, STEPS)
+    found = trunnion.locking(trunnion.Mechanism.model_validate(HOIST), STEPS)
     upper = figure_of(found, "locking").axes[0]
     spans = {patch.get_label(): patch for patch in upper.patches}
     limit = np.degrees(np.arccos(0.3))
@@ -170,8 +166,7 @@ def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     assert (held.get_x(), held.get_x() + held.get_width()) == pytest.approx((90, 180 - limit), abs=0.01)
     (line,) = [line for line in upper.lines if line.get_label() == "drive effort changes sign"]
     assert line.get_xdata()[0] == pytest.approx(180 - limit, abs=0.01)
-    colours = {patch.get_facecolor() for patch in upper.patches}
-    assert len(colours) == 4
+    assert len({patch.get_facecolor() for patch in upper.patches}) == 4
 
 
 def test_the_mechanism_is_drawn_at_a_place(cycle):

@@ -1,7 +1,5 @@
 """Numbers as they are shown, in units of the model; the browser is held to the same cases in `format.test.mjs`."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -24,8 +22,7 @@ def _given(value):
 
 @pytest.mark.parametrize(("peak", "unit", "factor", "shown"), CASES["prefixed"])
 def test_prefix(peak, unit, factor, shown):
-    got = prefixed(peak, unit)
-    assert got == (pytest.approx(factor), shown)
+    assert prefixed(peak, unit) == (pytest.approx(factor), shown)
 
 
 @pytest.mark.parametrize(("value", "text"), CASES["number"])
@@ -124,6 +121,5 @@ def test_a_result_is_shown_as_its_model_is_stated() -> None:
     page = trunnion.report(found)
     assert "lbf ft" in page
     assert " N m" not in page.replace("kN m", " N m").split("<script")[0]
-    figure = trunnion.plot(found, "torque")
-    assert "lbf ft" in figure.axes[0].get_ylabel()
+    assert "lbf ft" in trunnion.plot(found, "torque").axes[0].get_ylabel()
     assert float(found["drive_effort"].max()) > 20  # the numbers themselves are SI: 10 lb 2 ft are 27 N m

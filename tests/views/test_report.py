@@ -1,7 +1,5 @@
 """Reports are one file that fetches nothing, holds every figure, and lets no name become code."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json
@@ -62,8 +60,7 @@ def test_nothing_is_fetched(plain, ideal):
     text = report(plain, ideal)
     addresses = set(re.findall(r"https?://[^\s\"'<)]+", text))
     assert addresses == {"http://www.w3.org/2000/svg"}  # the name of a language
-    page = Page(text)
-    for tag, attrs in page.tags:
+    for tag, attrs in Page(text).tags:
         assert not attrs.get("src")
         assert attrs.get("href", "data:,") in ("data:,", "#notes"), tag
         assert not [name for name in attrs if name.startswith("on") or name == "style"]

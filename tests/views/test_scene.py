@@ -1,7 +1,5 @@
 """The scene is plain JSON, true to the result, and bears every kind of result; the page that node draws of it."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -151,8 +149,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
     @pytest.mark.slow
     def test_slots_on_moving_links_are_drawn(tmp_path):
         """The slit is as long as the slide travels and the block needs; a guide on the ground has none."""
-        result = analyse(MODELS["inverted slider-crank"](), 24)
-        (path,) = page(result, tmp_path)["slits"]
+        (path,) = page(analyse(MODELS["inverted slider-crank"](), 24), tmp_path)["slits"]
         ends = [[float(text) for text in end.split(",")] for end in path[1:].split("L")]
         assert np.hypot(*np.subtract(*ends)) > 2 * 26
         assert page(analyse(slider_crank(), 24), tmp_path)["slits"] == []

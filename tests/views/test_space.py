@@ -1,7 +1,5 @@
 """Views of spatial results: figures of every kind, a scene that is the result, a page that turns, flat columns."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -202,8 +200,7 @@ if shutil.which("node"):  # as in test_scene.py
         assert (space["after"]["axes"], space["after"]["screws"], space["after"]["twists"]) == (2, 3, 2)
         assert [name.split(",")[0] for name in space["after"]["names"]] == ["crank", "rod", "rocker"]
         assert "a turn" in space["after"]["names"][1]
-        views = space["views"]
-        assert all(one != two for one, two in pairwise(views))
+        assert all(one != two for one, two in pairwise(space["views"]))
         assert space["plane"] == ["Fy", "Fz"] * 4
         assert "20" in space["keys"][0]
         assert "mm" in space["keys"][0]

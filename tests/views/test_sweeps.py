@@ -1,7 +1,5 @@
 """Figures and tables of sweeps over any number of names: what runs along what, gaps, odd values, nothing cut off."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path as File
 
@@ -136,8 +134,7 @@ def test_a_point_that_locks_leaves_the_others_their_numbers():
 
 def test_the_file_has_a_row_a_point_of_any_number_of_names(tmp_path):
     grid = {"a": scale([1, 2]), "b": scale([3, 4, 5], "m", "mm", 1e-3), "c": scale([6]), "d": scale([7, 8])}
-    result = swept(grid, lambda a, b, c, d: a * b * d)
-    save(result, tmp_path / "grid.csv")
+    save(swept(grid, lambda a, b, c, d: a * b * d), tmp_path / "grid.csv")
     with (tmp_path / "grid.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 12

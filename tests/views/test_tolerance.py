@@ -1,7 +1,5 @@
 """Figures and tables of what tolerances do: every kind of result, what it holds, nothing cut off at an edge."""
 
-from __future__ import annotations
-
 import itertools
 import re
 
@@ -110,8 +108,7 @@ def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
 
 
 def test_contributions_are_sorted_and_add_up():
-    result = toleranced(72)
-    (axes,) = figure(result, "contributions").axes
+    (axes,) = figure(toleranced(72), "contributions").axes
     widths = [patch.get_width() for patch in axes.patches[:4]]
     assert widths == sorted(widths, reverse=True)
     assert sum(widths) == pytest.approx(100)
@@ -134,8 +131,7 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
 
 @pytest.mark.slow
 def test_corners_indices_and_failures_are_told():
-    read = readings(toleranced(72))[0]
-    (table,) = corners(read)
+    (table,) = corners(readings(toleranced(72))[0])
     assert table.head[0] == "worst corner"
     assert {row[0] for row in table.rows} == {f"dimensions.l{k}" for k in (1, 2, 3, 4)}
     assert {cell for row in table.rows if row[0] == "dimensions.l1" for cell in row[1:]} <= {

@@ -1,7 +1,5 @@
 """The drawings of the ways to assemble: every way with its name, the taken one marked, what has no place said."""
 
-from __future__ import annotations
-
 import pytest
 from matplotlib.colors import to_hex
 
@@ -27,8 +25,7 @@ def test_each_way_is_drawn_under_its_name_and_one_is_marked():
         "II(4,5)RRR    rod, output",
     ]
     for title, axes in drawn.items():
-        frame = to_hex(axes.spines["top"].get_edgecolor())
-        assert frame == (INK if "used" in title else RULE)
+        assert to_hex(axes.spines["top"].get_edgecolor()) == (INK if "used" in title else RULE)
         assert "CH"["rod" in title] in texts(axes)  # the inner pin of the group
 
 

@@ -1,7 +1,5 @@
 """The page's modules: their arithmetic by node and types by tsc, where there are these; vendored files as stated."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import trunnion
 from brief import brief
-from mechanisms_parts import Data, body, joined, prismatic, revolute, slide
+from mechanisms_parts import Data, body, joined, slide
 from trunnion import Mechanism
 from trunnion.groups.general import General
 from trunnion.groups.tree import OUTER, GroupJoint
@@ -180,7 +180,7 @@ def serial_arm() -> Data:
             "ram": body({"P": slide(-0.2, 0.05, -0.4), "W": [0.6, 0.1]}, 2),
             "hand": body({"W": [0.05, 0.02], "T": [0.4, 0]}, 3, 0.3),
         },
-        "joints": {"A": revolute("ground", "arm"), "P": prismatic("arm", "ram"), "W": revolute("hand", "ram")},
+        "joints": joined("ground -A- arm =P= ram, hand -W- ram"),
         "drivers": {
             "A": {"speed": 1.0, "range": [0.0, 2.0]},
             "P": {"speed": -0.25, "range": [0.5, 0.0]},
@@ -440,25 +440,39 @@ def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.
     def local(v: Sequence[float]) -> list[float]:
         return [float(v[0]), sign * float(v[1])]
 
+    def added(joint: str) -> float:
+        """To its rotation, which counts from the frame's x axis: that has turned, if it is a joint of the ground."""
+        links = data["joints"][joint]["links"]
+        return {0: turn, 1: -turn}[links.index("ground")] if "ground" in links else 0.0
+
     for name, link in data["links"].items():
         at, direction = (place, vector) if name == "ground" else (local, local)
         for key, value in link["points"].items():
             link["points"][key] = (
                 {"at": at(value["at"]), "axis": direction(value["axis"])} if isinstance(value, dict) else at(value)
             )
-        if "centre" in link:
-            link["centre"] = local(link["centre"])
+        link |= {"centre": local(link["centre"])} if "centre" in link else {}
     data["gravity"] = vector(data["gravity"])
     for load in data.get("loads", {}).values():
-        if "force" in load:
-            load["force"] = vector(load["force"])
-        if "moment" in load:
-            load["moment"] = sign * load["moment"]
+        load |= {"force": vector(load["force"])} if "force" in load else {}
+        load |= {"moment": sign * load["moment"]} if "moment" in load else {}
     data["assembly"] = {key: place(value) for key, value in data.get("assembly", {}).items()}
-    for name, driver in data["drivers"].items():
-        if data["joints"][name]["type"] == "revolute":
-            _turn_driver(driver, data["joints"][name]["links"], turn, sign)
-    _turn_gears(data, turn, sign)
+    turning = [name for name, joint in data["joints"].items() if joint["type"] == "revolute"]
+    for name in set(turning) & data["drivers"].keys():
+        driver = data["drivers"][name]
+        driver["speed"] *= sign
+        if "range" in driver:
+            driver["range"] = [sign * q + added(name) for q in driver["range"]]
+        else:
+            driver["start"] = sign * driver.get("start", 0.0) + added(name)
+    for gear in data.get("gears", {}).values():
+        key = next(key for key in ("ratio", "radius", "lead") if key in gear)
+        first, *second = (added(joint) for joint in gear["joints"] if joint in turning)
+        if key == "ratio":
+            gear["phase"] = sign * gear["phase"] + second[0] - gear["ratio"] * first
+        else:  # a slide is the same in a mirror
+            gear[key] *= sign
+            gear["phase"] -= gear[key] / (1.0 if key == "radius" else 2 * np.pi) * first
     return data
 
 
@@ -490,49 +504,9 @@ def in_units(data: Data, length: float, mass: float = 1.0, time: float = 1.0) ->
     return dict(data)
 
 
-def _turn_gears(data: Data, turn: float, sign: float) -> None:
-    """Rotations against the ground count from the frame's x axis, which has turned."""
-    for gear in data.get("gears", {}).values():
-        joints, key = _coupled(data, gear)
-        first, second = (_offset(data["joints"][joint]["links"], turn) for joint in joints)
-        if key == "ratio":
-            gear["phase"] = sign * gear["phase"] + second - gear["ratio"] * first
-        else:  # a slide is the same in a mirror
-            gear[key] *= sign
-            gear["phase"] -= gear[key] / (1.0 if key == "radius" else 2 * np.pi) * first
-
-
-def _coupled(data: Data, gear: Data) -> tuple[list[str], str]:
-    """Joints of a gear pair, that which turns first, and what states its ratio."""
-    key = next(key for key in ("ratio", "radius", "lead") if key in gear)
-    return sorted(
-        gear["joints"], key=lambda joint: key != "ratio" and data["joints"][joint]["type"] == "prismatic"
-    ), key
-
-
-def _offset(links: Sequence[str], turn: float) -> float:
-    """What a turned frame adds to the rotation of a joint of the ground."""
-    return {0: turn, 1: -turn}[list(links).index("ground")] if "ground" in links else 0.0
-
-
-def _turn_driver(driver: Data, links: Sequence[str], turn: float, sign: float) -> None:
-    """A driven rotation against the ground counts from the frame's x axis, which has turned."""
-    offset = _offset(links, turn)
-    driver["speed"] = sign * driver["speed"]
-    if "range" in driver:
-        driver["range"] = [sign * q + offset for q in driver["range"]]
-    else:
-        driver["start"] = sign * driver.get("start", 0.0) + offset
-
-
-# ---- groups by hand -------------------------------------------------------------------------------------------
-
-KIND = {"R": "revolute", "P": "prismatic"}
-
-
 def dyad(letters: str) -> General:
     """General group of two links on known links: outer joint, inner joint, outer joint."""
-    first, inner, last = (KIND[letter] for letter in letters)
+    first, inner, last = ({"R": "revolute", "P": "prismatic"}[letter] for letter in letters)
     joints = (GroupJoint(first, (OUTER, 0)), GroupJoint(inner, (0, 1)), GroupJoint(last, (OUTER, 1)))
     return General(2, joints)
 

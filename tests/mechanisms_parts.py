@@ -8,14 +8,6 @@ import numpy as np
 Data = dict[str, Any]
 
 
-def revolute(*links: str) -> Data:
-    return {"type": "revolute", "links": list(links)}
-
-
-def prismatic(*links: str) -> Data:
-    return {"type": "prismatic", "links": list(links)}
-
-
 def joined(chains: str, **more: Data) -> Data:
     """Joints along chains of links, such as "ground -A- crank -B:spherical- rod, ground =S= ram": = for a slide.
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import simpson, solve_ivp
 
+from mechanisms_parts import joined
 from trunnion.joints.contact import hertz_stiffness
 from trunnion.model.mechanism import Mechanism
 
@@ -18,7 +19,8 @@ LANKARANI = {"law": "lankarani-nikravesh", "restitution": 0.9, **STEEL}
 
 def rattling(contact: dict[str, Any] | None = None, pin: dict[str, Any] | None = None, **more: Any) -> Mechanism:
     """A slider-crank at constant speed whose gudgeon pin, 19 mm, lies in a hole of 20 mm; without gravity."""
-    axis = {"at": [0, 0], "axis": [1, 0]}
+    axis, gudgeon = {"at": [0, 0], "axis": [1, 0]}, {"pin": pin or {"radius": "9.5 mm", "hole_radius": "10 mm"}}
+    gudgeon |= {} if contact == {} else {"contact": contact or LANKARANI}
     data: dict[str, Any] = {
         "links": {
             "frame": {"points": {"O": [0, 0], "S": axis}},
@@ -27,17 +29,7 @@ def rattling(contact: dict[str, Any] | None = None, pin: dict[str, Any] | None =
             "slider": {"points": {"Q": [0, 0], "S": axis}, "mass": 0.14},
         },
         "ground": "frame",
-        "joints": {
-            "O": {"type": "revolute", "links": ["frame", "crank"]},
-            "P": {"type": "revolute", "links": ["crank", "rod"]},
-            "Q": {
-                "type": "revolute",
-                "links": ["rod", "slider"],
-                "pin": pin or {"radius": "9.5 mm", "hole_radius": "10 mm"},
-                **({} if contact == {} else {"contact": contact or LANKARANI}),
-            },
-            "S": {"type": "prismatic", "links": ["frame", "slider"]},
-        },
+        "joints": joined("frame -O- crank -P- rod -Q- slider, frame =S= slider", Q=gudgeon),
         "drivers": {"O": {"speed": SPEED}},
         "assembly": {"Q": [0.17, 0]},
     }

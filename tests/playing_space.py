@@ -24,6 +24,8 @@ def rattling_in_space(contact: dict[str, Any] | None = None, **more: Any) -> Mec
 
     slide = {"at": [0, 0, 0], **ALONG}
     rod, slider = {"xx": 1e-5, "yy": 2.5e-4, "zz": 2.5e-4}, {"xx": 1e-4, "yy": 1e-4, "zz": 1e-4}
+    gudgeon: dict[str, Any] = {"pin": {"radius": "9.5 mm", "hole_radius": "10 mm", "length": 1, "end_float": "1 mm"}}
+    gudgeon |= {} if contact == {} else {"contact": contact or LANKARANI}
     data: dict[str, Any] = {
         "space": "spatial",
         "links": {
@@ -33,17 +35,7 @@ def rattling_in_space(contact: dict[str, Any] | None = None, **more: Any) -> Mec
             "slider": {"points": {"Q": on(0), "S": slide}, "mass": 0.14, "inertia": slider},
         },
         "ground": "frame",
-        "joints": {
-            "O": {"type": "revolute", "links": ["frame", "crank"]},
-            "P": {"type": "revolute", "links": ["crank", "rod"]},
-            "Q": {
-                "type": "revolute",
-                "links": ["rod", "slider"],
-                "pin": {"radius": "9.5 mm", "hole_radius": "10 mm", "length": 1, "end_float": "1 mm"},
-                **({} if contact == {} else {"contact": contact or LANKARANI}),
-            },
-            "S": {"type": "prismatic", "links": ["frame", "slider"]},
-        },
+        "joints": joined("frame -O- crank -P- rod -Q- slider, frame =S= slider", Q=gudgeon),
         "drivers": {"O": {"speed": SPEED}},
         "assembly": {"Q": [0.17, 0, 0]},
     }

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechanisms_parts import Data, corner, joined, revolute, slide
+from mechanisms_parts import Data, corner, joined, slide
 from trunnion import Mechanism
 from trunnion.studies.tolerance.inputs import inputs_of
 from trunnion.studies.tolerance.linear import ToleranceStudy, study
@@ -132,12 +132,8 @@ def rssr(pin: Data | None = None, tolerances: Data | None = None, **options: Any
             "rod": {"points": {"B": [0, 0, 0], "C": ["b", 0, 0]}},
             "rocker": {"points": {"D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}, "C": ["c", 0, "s4"]}},
         },
-        "joints": {
-            "A": revolute("ground", "crank"),
-            "B": {"type": "spherical", "links": ["crank", "rod"]},
-            "C": {"type": "spherical", "links": ["rod", "rocker"]},
-            "D": revolute("ground", "rocker") | ({"pin": pin} if pin else {}),
-        },
+        "joints": joined("ground -A- crank -B:spherical- rod -C:spherical- rocker, ground -D- rocker",
+                         D={"pin": pin} if pin else {}),
         "drivers": {"A": {"speed": 2.0}},
         "tolerances": widths if tolerances is None else tolerances,
         "measures": {"psi": {"rotation": "D", "at": "60 deg"}},

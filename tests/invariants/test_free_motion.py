@@ -9,6 +9,7 @@ import pytest
 from scipy.special import ellipk
 
 from brief import brief
+from mechanisms_parts import joined
 from playing import rattling
 from timed import (
     ANTIPARALLELOGRAM,
@@ -41,14 +42,6 @@ LAWS: dict[str, Any] = {
         "law": "lugre", "coefficient": 0.08, "static": 0.12, "stribeck_speed": 0.05, "stiffness": 1e4, "damping": 0.01,
     },
 }  # fmt: skip
-
-
-def motored(name: str, driver: dict[str, Any]) -> Mechanism:
-    """An example whose first driver has a motor."""
-    data = read(EXAMPLES / f"{name}.yaml").data()
-    first = next(iter(data["drivers"]))
-    data["drivers"][first] = {**data["drivers"][first], **driver}
-    return Mechanism(**data)
 
 
 def compared(mechanism: Mechanism, lanes: int = 5) -> None:
@@ -102,7 +95,9 @@ DRIVES: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", ["durango-fourbar", "whitworth-quick-return", "jansen"])
 def test_machine_code_of_examples_is_what_walks_find(name: str, kind: str) -> None:
     """Dyads of several kinds, one behind the other, driven by every kind of motor."""
-    compared(motored(name, {"motor": DRIVES[kind]}), lanes=3)
+    data = read(EXAMPLES / f"{name}.yaml").data()
+    next(iter(data["drivers"].values()))["motor"] = DRIVES[kind]
+    compared(Mechanism(**data), lanes=3)
 
 
 def test_slow_motion_is_the_quasi_static_cycle() -> None:
@@ -131,7 +126,6 @@ def test_it_stays_where_friction_holds_it() -> None:
 
 def rocker(friction: float) -> Mechanism:
     """A crank-rocker driven at its rocker, which turns round at cos φ = −0.78125, coupler and crank in line."""
-    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
     return Mechanism(
         gravity=[0, 0],
         links={
@@ -140,7 +134,7 @@ def rocker(friction: float) -> Mechanism:
             "coupler": {"points": {"B": [0, 0], "C": [0.18, 0]}, "mass": 0.5, "centre": [0.09, 0], "inertia": 1e-3},
             "rocker": {"points": {"D": [0, 0], "C": [0.12, 0]}, "mass": 0.5, "centre": [0.06, 0], "inertia": 1e-3},
         },
-        joints={name: {"type": "revolute", "links": links} for name, links in ends.items()},
+        joints=joined("ground -A- crank -B- coupler -C- rocker, ground -D- rocker"),
         joint_defaults={"pin": {"radius": 0.008}, **({"friction": friction} if friction else {})},
         drivers={"D": {"speed": 1, "range": ["110 deg", "150 deg"], "motor": {"kind": "constant", "effort": 2}}},
         assembly={"B": [0.05, 0.02]},
@@ -160,28 +154,20 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -
     assert found.asked < 1000
 
 
-@pytest.mark.parametrize(
-    ("driver", "code"),
-    [
-        ({"speed": 1}, "input.drivers"),
-        ({"speed": 1, "motor": {**LINEAR, "inertia": -1}}, "input.drivers"),
-        ({"speed": 1, "motor": {"kind": "table", "points": [[0, 1], [0, 2]]}}, "input.drivers"),
-        ({"speed": 1, "motor": {"kind": "linear", "stall_effort": 1}}, "input.drivers"),
-        ({"speed": 1, "motor": {**LINEAR, "effort": 1}}, "input.drivers"),
-        ({"speed": 1, "motor": {**LINEAR, "efficiency": 1.2}}, "input.drivers"),
-        ({"speed": 1, "motor": {**LINEAR, "ratio": 0}}, "input.drivers"),
-        ({"speed": 1, "motor": {**LINEAR, "brake": 2}}, "input.drivers"),
-        ({"speed": 1, "initial": {"speed": 1}}, "input.drivers"),
-        ({"speed": 1, "motor": {**LINEAR, "no_load_speed": -100}}, "input.drivers"),
-        ({"speed": 1, "range": [0, 1], "motor": LINEAR, "initial": {"coordinate": 2}}, "input.drivers"),
-        ({"speed": 1, "motor": {"kind": "steam"}}, "input.drivers"),
-    ],
-)
-def test_a_driver_that_cannot_be_let_move_is_refused(driver: dict[str, Any], code: str) -> None:
-    data = {**wheel(LINEAR).data(), "drivers": {"A": driver}}
+NO_MOTION: list[dict[str, Any]] = [
+    {}, {"initial": {"speed": 1}}, {"range": [0, 1], "motor": LINEAR, "initial": {"coordinate": 2}},
+    {"motor": {"kind": "table", "points": [[0, 1], [0, 2]]}}, {"motor": {"kind": "linear", "stall_effort": 1}},
+    {"motor": {"kind": "steam"}},
+    *({"motor": LINEAR | wrong} for wrong in (
+        {"inertia": -1}, {"effort": 1}, {"efficiency": 1.2}, {"ratio": 0}, {"brake": 2}, {"no_load_speed": -100})),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("driver", NO_MOTION)
+def test_a_driver_that_cannot_be_let_move_is_refused(driver: dict[str, Any]) -> None:
     with pytest.raises(MechanismError) as caught:
-        simulate(Mechanism(**data), 1.0)
-    assert {one.code for one in caught.value.findings} == {code}
+        simulate(Mechanism(**{**wheel(LINEAR).data(), "drivers": {"A": {"speed": 1, **driver}}}), 1.0)
+    assert {one.code for one in caught.value.findings} == {"input.drivers"}
 
 
 def test_what_has_no_mass_has_no_acceleration() -> None:
@@ -225,17 +211,13 @@ def ended(result: Any, code: str) -> dict[str, Any]:
     return dict(figures)
 
 
-def figures(mechanism: Mechanism, steps: int) -> dict[str, tuple[Any, str]]:
-    return {one.name: (one.value, one.place) for one in simulate(mechanism, 1.0, steps).trunnion.summary}
-
-
 def test_the_figures_at_the_end_are_of_the_end() -> None:
     """A wheel under a constant torque: ω = √(2 T θ / J) at the end of its range."""
     data = wheel(LINEAR, drag=0.0).data()
     data["drivers"] = {"A": {"speed": 1, "range": [0, 2], "motor": {"kind": "constant", "effort": 4}}}
-    found = figures(Mechanism(**data), 1)
-    assert found["A.speed_end"][0] == pytest.approx(np.sqrt(2 * 4 * 2 / 0.05), rel=1e-8)
-    assert found["work_drive"][0] == pytest.approx(8.0, rel=1e-8)
+    found = {one.name: one.value for one in simulate(Mechanism(**data), 1.0, 1).trunnion.summary}
+    assert found["A.speed_end"] == pytest.approx(np.sqrt(2 * 4 * 2 / 0.05), rel=1e-8)
+    assert found["work_drive"] == pytest.approx(8.0, rel=1e-8)
 
 
 # ranges

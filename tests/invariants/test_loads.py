@@ -8,8 +8,8 @@ import pytest
 
 import trunnion
 from brief import brief
-from mechanisms import Array, Data, findings, four_bar, prismatic, slide, slider_crank
-from mechanisms_parts import bare
+from mechanisms import Array, Data, findings, four_bar, slide, slider_crank
+from mechanisms_parts import bare, joined
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.spline import look_up
@@ -401,7 +401,7 @@ def cart(**more: Any) -> Data:
     """A cart that is driven along the ground, from 0 to 0.25 m."""
     return {
         "links": {"ground": {"points": {"X": slide(0, 0)}}, "cart": {"points": {"X": slide(0, 0)}}},
-        "joints": {"X": prismatic("ground", "cart")},
+        "joints": joined("ground =X= cart"),
         "drivers": {"X": {"speed": 0.1, "range": [0.0, 0.25]}},
         **more,
     }

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import mechanisms
 import trunnion
+from mechanisms_parts import joined
 from played import with_play
 from trunnion import Mechanism, analyse, read
 from trunnion.cycle.findings import listed
@@ -128,21 +129,15 @@ def test_a_measure_is_the_figure_of_the_summary_where_pins_cross_their_play(step
         assert figures[name] == pytest.approx(figures[f"A.{key}"], rel=1e-6)
 
 
-def massless_compressor() -> dict[str, Any]:
-    """The model's data, pins in loaded seats; without pressure, from 40° to 180°, nothing presses."""
-    data = read(EXAMPLES / "slider-crank.yaml").data()
-    data["gravity"] = [0, 0]
-    for link in data["links"].values():
-        for key in ("mass", "centre", "inertia"):
-            link.pop(key, None)
-    data["joint_defaults"] = {"pin": {"clearance": "10 um"}, "seat": "loaded"}
-    return data
-
-
 @pytest.mark.slow
 def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
     """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
-    result = analyse(Mechanism(**massless_compressor()), steps=360)
+    data = read(EXAMPLES / "slider-crank.yaml").data()
+    data |= {"gravity": [0, 0], "joint_defaults": {"pin": {"clearance": "10 um"}, "seat": "loaded"}}
+    for link in data["links"].values():
+        for key in ("mass", "centre", "inertia"):
+            link.pop(key, None)
+    result = analyse(Mechanism(**data), steps=360)
     assert np.array_equal(np.flatnonzero(result["contact_lost"].sel(joint="P")), np.arange(40, 181))
     assert np.all(result["seat_offset"].sel(joint="P", end="1", axis=["x", "y"]).isel(position=slice(41, 180)) == 0)
     (finding,) = told(result, "contact.unloaded")  # of all joints at once, and no loss of any of them
@@ -176,12 +171,7 @@ def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch:
             "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
             "ram": {"points": {"Q": [0, 0], "S": pin}},
         },
-        "joints": {
-            "O": {"type": "revolute", "links": ["ground", "crank"]},
-            "P": {"type": "revolute", "links": ["crank", "rod"]},
-            "Q": {"type": "revolute", "links": ["rod", "ram"]},
-            "S": {"type": "prismatic", "links": ["ground", "ram"], "friction": 0},
-        },
+        "joints": joined("ground -O- crank -P- rod -Q- ram, ground =S= ram", S={"friction": 0}),
         "joint_defaults": {"pin": {"radius": "5 mm", "clearance": "0.05 mm"}, "friction": 0.1, "seat": "loaded"},
         "drivers": {"O": {"range": ["-90 deg", "-1 deg"], "speed": "1 rad/s"}},
         "springs": {"work": {"between": ["ground.W", "ram.Q"], "stiffness": "800 N/mm", "only": "push", "useful": True,

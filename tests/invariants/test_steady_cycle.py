@@ -8,6 +8,7 @@ import pytest
 
 import trunnion
 from brief import brief
+from mechanisms_parts import joined
 from timed import LINEAR, mass_on_a_belt, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate, sweep
 from trunnion.dynamics.measured import figures_in_time
@@ -31,10 +32,7 @@ def shaker(inertia: float, **motor: Any) -> trunnion.Mechanism:
             "carriage": {"points": {"S": slide, "A": [0, 0]}, "mass": 10},
             "rotor": {"points": {"A": [0, 0]}, "mass": 2, "centre": [0.05, 0], "inertia": inertia},
         },
-        joints={
-            "S": {"type": "prismatic", "links": ["ground", "carriage"]},
-            "A": {"type": "revolute", "links": ["carriage", "rotor"]},
-        },
+        joints=joined("ground =S= carriage -A- rotor"),
         drivers={
             "A": {"speed": 20, "motor": {"kind": "linear", "stall_effort": 4, "no_load_speed": 20, **motor},
                   "initial": {"speed": 20}},
@@ -143,10 +141,6 @@ def spread(mechanism: Mechanism, count: int, **numbers: float) -> dict[str, Any]
     return dict(mechanism.parameters(moved))
 
 
-def of_sample(values: dict[str, Any], i: int) -> dict[str, Any]:
-    return {path: float(value[i, 0]) if np.ndim(value) else value for path, value in values.items()}
-
-
 def test_flywheels_with_inertias_of_their_own() -> None:
     """J ω̇ = 4 (1 − ω/150) − 0.6: ω = 127.5 (1 − e^(−t/τ)), τ = J 150/4, of every sample."""
     mechanism, count, duration = wheel(LINEAR), 5, 12.0
@@ -209,7 +203,8 @@ def test_together_as_each_by_itself(name: str) -> None:
     values = spread(mechanism, 2, links__piston__mass=0.05, **dict.fromkeys(motor, 0.03))
     together = figures_in_time(prepare(mechanism), "O", values, 2, 0.3, 1e-10)
     for i in range(2):
-        alone = figures_in_time(prepare(mechanism), "O", of_sample(values, i), 1, 0.3, 1e-10)
+        own = {path: float(value[i, 0]) if np.ndim(value) else value for path, value in values.items()}
+        alone = figures_in_time(prepare(mechanism), "O", own, 1, 0.3, 1e-10)
         for key in FIGURES:
             near = AGREED if key == "fluctuation" else 0.0  # a difference of speeds, by their mean
             np.testing.assert_allclose(together[key][i], alone[key][0], AGREED, near, err_msg=f"{key} of {i}")

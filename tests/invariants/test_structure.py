@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 import trunnion
-from mechanisms import MODELS, Data, build, four_bar, model, revolute
+from mechanisms import MODELS, Data, build, four_bar, model
 from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError
 from trunnion.model.file import entries_of
@@ -65,7 +65,7 @@ def loose_chain(links: Sequence[str], joints: Sequence[tuple[str, str]], drivers
         name = f"J{k}"
         for link in pair:
             data["links"][link]["points"][name] = list(rng.normal(size=2))
-        data["joints"][name] = revolute(*pair)
+        data["joints"][name] = {"type": "revolute", "links": list(pair)}
     data["drivers"] = {f"J{k}": {"speed": 1.0} for k in drivers}
     return data
 

@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import multivariate_normal
 
 import trunnion
+from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError
 from trunnion.results.attributes import summary_of
 from trunnion.studies.allocation.allocate import half_widths
@@ -85,11 +86,8 @@ def test_closed_forms_of_one_limit(criterion: str) -> None:
     assert dimensions(result) == pytest.approx(t, rel=1e-6)  # a gap of 1e-6 would leave them open by 1e-3
     assert float(result["cost_total"]) == pytest.approx(cost, rel=1e-8)
     # more room is worth what the cost falls by
-    wider = trunnion.allocate(
-        fourbar(measures={"θ": {"angle": "rocker", "at": "60 deg", "limit": "±0.1001 deg"}}),
-        criterion=criterion,
-        samples=0,
-    )
+    wider = fourbar(measures={"θ": {"angle": "rocker", "at": "60 deg", "limit": "±0.1001 deg"}})
+    wider = trunnion.allocate(wider, criterion=criterion, samples=0)
     fall = float(result["cost_total"] - wider["cost_total"]) / np.radians(1e-4)
     assert float(result["saving"][0]) == pytest.approx(fall, rel=2e-3)
 
@@ -280,15 +278,11 @@ def test_an_absurd_price_proves_nothing() -> None:
 def test_run_outs_and_seats_stay_as_they_are() -> None:
     """A run-out that points anywhere has no middle; a pin whose seat is given has no play to choose."""
     data = fourbar().data()
-    tolerances = {
-        **data["tolerances"],
-        "joints.B.misalignment.offset": {"limits": "+0.01/0 mm", "direction": "uniform"},
-    }
-    joints = {**data["joints"]}
-    joints["B"] = {**joints["B"], "misalignment": {"offset": "0 mm"}}
-    joints["C"] = {**joints["C"], "pin": {"clearance": "10 um"}, "seat": {"xi": "30 deg"}}
-    costs = {**data["costs"], **dict.fromkeys(("B.misalignment.offset", "C.clearance"), data["costs"]["l1"])}
-    result = trunnion.allocate(fourbar(joints=joints, costs=costs, tolerances=tolerances), steps=24, samples=0)
+    data["tolerances"]["joints.B.misalignment.offset"] = {"limits": "+0.01/0 mm", "direction": "uniform"}
+    data["joints"]["B"]["misalignment"] = {"offset": "0 mm"}
+    data["joints"]["C"] |= {"pin": {"clearance": "10 um"}, "seat": {"xi": "30 deg"}}
+    data["costs"] |= dict.fromkeys(("B.misalignment.offset", "C.clearance"), data["costs"]["l1"])
+    result = trunnion.allocate(Mechanism(**data), steps=24, samples=0)
     # what it does stays, and the others keep their limits with it
     assert result["bought"].sel(parameter="joints.B.misalignment.offset") == 0
     assert float(result["used"][0]) == pytest.approx(1)
@@ -326,12 +320,7 @@ def test_a_tolerance_without_effect_is_not_bounded_by_rounding() -> None:
             "lower": {"points": {"K": [0, 0], "P": [0.3, 0]}},
             "ram": {"points": {"P": [0, 0], "S": {"at": [0, 0], "axis": [0, -1]}}},
         },
-        joints={
-            **{name: {"type": "revolute", "links": links.split()} for name, links in {
-                "A": "ground crank", "B": "crank pull", "C": "pull upper", "O": "ground upper", "K": "upper lower",
-                "P": "lower ram"}.items()},
-            "S": {"type": "prismatic", "links": ["ground", "ram"]},
-        },
+        joints=joined("ground -A- crank -B- pull -C- upper -K- lower -P- ram, ground -O- upper, ground =S= ram"),
         drivers={"A": {"speed": 4.0}},
         assembly={"K": [0.1, -0.23], "P": [0, -0.5]},
         tolerances={"a": "±0.1 mm", "r": "±0.05 mm"},

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 import trunnion
 import trunnion.dynamics.impact_motion as impact_motion
 from brief import brief
+from mechanisms_parts import joined
 from playing import SMOOTH, SPEED, both_pins, loose_slider, own_equations, rattling, rubbing
 from trunnion import simulate
 from trunnion.dynamics.compiled_rates import CompiledRates
@@ -116,8 +117,9 @@ def test_the_reaction_in_play_is_the_contact_force() -> None:
 
 def test_machine_code_has_the_rates_of_the_walks() -> None:
     for mechanism in (rattling(), both_pins(), loose_slider(), rubbing(SMOOTH), rubbing(0.1)):
-        motion, row = _opened(mechanism)
-        compiled = CompiledRates(motion)
+        run = prepare(mechanism)
+        motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
+        row, compiled = initial_row(motion), CompiledRates(motion)
         compiled.walks = None  # they are not asked
         rng = np.random.default_rng(3)
         for _ in range(5):
@@ -130,12 +132,6 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
             assert np.allclose(one.others, other.others, rtol=1e-9, atol=1e-13 * np.max(np.abs(other.second)))
             for seen, wanted in zip(compiled.look(at), Walks(motion).look(at), strict=True):
                 assert np.allclose(seen, wanted, rtol=1e-9, atol=1e-15)
-
-
-def _opened(mechanism: Mechanism) -> tuple[FreeMotion, Array]:
-    run = prepare(mechanism)
-    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
-    return motion, initial_row(motion)
 
 
 def test_a_rod_that_no_joint_holds() -> None:
@@ -170,6 +166,7 @@ def test_other_analyses_leave_the_contact_out() -> None:
 
 FIRST, SECOND = 2.692502752e-3, 5.612363190e-3  # s, of Flores, Leine, Glocker's slider
 CLEARANCE = 1e-3  # m; what a step tells of its inside is exact to the integrator's tolerance
+GUIDE = {"length": 0.1, "height": 0.05, "clearance": CLEARANCE}
 RIGID = {"law": "rigid", "restitution": 0.4}
 
 
@@ -186,18 +183,8 @@ def guide(friction: float = 0.01, contact: dict[str, Any] | None = None, **initi
             "slider": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 0.076, "inertia": 2.7e-6},
         },
         ground="frame",
-        joints={
-            "O": {"type": "revolute", "links": ["frame", "crank"]},
-            "A": {"type": "revolute", "links": ["crank", "rod"]},
-            "B": {"type": "revolute", "links": ["rod", "slider"]},
-            "S": {
-                "type": "prismatic",
-                "links": ["frame", "slider"],
-                "guide": {"length": 0.1, "height": 0.05, "clearance": CLEARANCE},
-                "friction": friction,
-                "contact": contact or RIGID,
-            },
-        },
+        joints=joined("frame -O- crank -A- rod -B- slider, frame =S= slider",
+                      S={"guide": GUIDE, "friction": friction, "contact": contact or RIGID}),
         drivers={"O": {"speed": 150, "free": True, "initial": {"coordinate": 0, "speed": 150, **initial}}},
         assembly={"S": [0.459, 0]},
     )  # fmt: skip
@@ -280,7 +267,6 @@ def test_impacts_without_end_are_ended_by_one_without_restitution(monkeypatch: p
 def falling(restitution: float, **more: Any) -> Mechanism:
     """A slider that falls through the play of its guide, on a shoe that holds it upright."""
     along, upward = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
-    play = {"guide": {"length": 0.1, "height": 0.05, "clearance": CLEARANCE}}
     return Mechanism(
         gravity=[0, -9.81],
         links={
@@ -290,13 +276,8 @@ def falling(restitution: float, **more: Any) -> Mechanism:
             "ram": {"points": {"X": upward, "Y": along}},
         },
         ground="frame",
-        joints={
-            "S": {"type": "prismatic", "links": ["frame", "slider"], **play,
-                  "contact": {"law": "rigid", "restitution": restitution}},
-            "B": {"type": "revolute", "links": ["slider", "shoe"]},
-            "X": {"type": "prismatic", "links": ["ram", "shoe"]},
-            "Y": {"type": "prismatic", "links": ["frame", "ram"]},
-        },
+        joints=joined("frame =S= slider -B- shoe, frame =Y= ram =X= shoe",
+                      S={"guide": GUIDE, "contact": {"law": "rigid", "restitution": restitution}}),
         drivers={"Y": {"speed": 0.01, "range": [0, 1]}},
         **more,
     )  # fmt: skip

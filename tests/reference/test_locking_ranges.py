@@ -9,7 +9,7 @@ from test_locking import CRITICAL, pushed_slider
 
 import trunnion
 from mechanisms import eccentric_press
-from mechanisms_parts import Data, plunger, revolute
+from mechanisms_parts import Data, joined, plunger
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
 from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
@@ -25,7 +25,7 @@ def hoist(friction: float = FRICTION) -> Mechanism:
     """A crank on one pin that lifts a weight from hanging level to behind the top: the load passes its pin there."""
     data: Data = {
         "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P": [ARM, 0]}}},
-        "joints": {"A": {**revolute("ground", "crank"), "pin": {"radius": RADIUS}, "friction": friction}},
+        "joints": joined("ground -A- crank", A={"pin": {"radius": RADIUS}, "friction": friction}),
         "drivers": {"A": {"speed": 1.0, "range": [0.0, 2.5]}},
         "loads": {"weight": {"link": "crank", "at": "P", "force": [0.0, -100.0], "useful": True}},
     }

@@ -12,7 +12,7 @@ from benchmarks.drawn import planar
 import trunnion
 from brief import brief
 from mechanisms import four_bar, model, slider_crank
-from mechanisms_parts import body, revolute
+from mechanisms_parts import body, joined
 from mechanisms_space import cardan, closed, rssr
 from reference.maximal_space import Array, Data, Drive, in_planes, pose_of
 from reference.seat_oracle import clearance, settle, travelling
@@ -122,7 +122,7 @@ def one_crank() -> Data:
         "gravity": [0.0, -g],
         "joint_defaults": {"pin": {"radius": 0.01, "clearance": 1e-5}, "seat": "loaded"},
         "links": {"ground": {"points": {"A": [0, 0]}}, "crank": link},
-        "joints": {"A": revolute("ground", "crank")},
+        "joints": joined("ground -A- crank"),
         "drivers": {"A": {"speed": float(np.sqrt(g / r))}},
     }
 

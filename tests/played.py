@@ -162,7 +162,8 @@ def by_duals(run: Run, measure: Measure, known: Mapping[str, Play], time: Array,
 
     Seats stay on the hole.
     """
-    rows = _offsets(known)
+    paths = [f"{HOLE}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
+    rows = dict(zip(paths, np.eye(len(paths))[:, :, None], strict=True))  # each moves in a sample of its own
     offsets = {path: Dual(0.0, row) for path, row in rows.items()}
     with np.errstate(all="ignore"):
         if measure.kind in MOTIONS:
@@ -171,15 +172,5 @@ def by_duals(run: Run, measure: Measure, known: Mapping[str, Play], time: Array,
             number = measure.curve(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))[0]
         else:
             number = measure.curve(run.at(time, offsets, method))[0]
-    return _by_end(known, np.broadcast_to(derivative(number), (len(rows), len(time))))
-
-
-def _offsets(known: Mapping[str, Play]) -> dict[str, Array]:
-    """Paths of the offsets with a row each, (sample, 1), in which it is 1 in a sample of its own."""
-    paths = [f"{HOLE}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
-    return dict(zip(paths, np.eye(len(paths))[:, :, None], strict=True))
-
-
-def _by_end(known: Mapping[str, Play], slopes: Array) -> Loads:
-    each = iter(slopes)
+    each = iter(np.broadcast_to(derivative(number), (len(rows), len(time))))
     return {name: [tuple(next(each) for _ in end) for end in play.model.ends] for name, play in known.items()}

@@ -41,10 +41,6 @@ def varied(run: Any, paths: list[str], part: Any) -> dict[str, Any]:
     return dict(mechanism.parameters(replaced))
 
 
-def steps_of(run: Any, paths: list[str]) -> Array:
-    return np.array([2e-4 * max(abs(run.values[path]), 0.1) for path in paths])
-
-
 CASES = [
     *((name, friction) for name in MODELS for friction in (None, 0.15)),
     *((name, law_named(law)) for name in ("four-bar", "slider-crank") for law in FRICTION_LAWS if law != "rolling"),
@@ -59,7 +55,7 @@ def test_duals_equal_central_differences(name: str, friction: float | Data | Non
     run = prepare(build(MODELS[name](), friction=friction, radius=0.03))
     paths = [path for path in run.values if not path.startswith(("assembly.", "joint_defaults."))]
     time = (np.arange(POSITIONS) + 0.43) / POSITIONS * run.cycle.duration  # no slip changes its sign nearby
-    step = steps_of(run, paths)
+    step = np.array([2e-4 * max(abs(run.values[path]), 0.1) for path in paths])
     shape = (len(paths), POSITIONS)
 
     dual = run.solve(time, varied(run, paths, Dual), METHOD)

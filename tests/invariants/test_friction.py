@@ -156,19 +156,13 @@ def _pins(x, share, start, gain, signs):
     return residual, jacobian
 
 
-def _drawn(rng: np.random.Generator, lanes: int):
-    """Random pins with strong friction: reactions without it, influences, senses, lane last."""
-    start, gain = rng.normal(size=(3, 2, lanes)), rng.normal(size=(3, 3, 2, lanes)) * 0.6
-    return start, gain, rng.choice([-1.0, 1.0], size=(3, lanes))
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "lanes"), [(0, 400), pytest.param(2, 2000, marks=pytest.mark.slow)])
-def test_lanes_lock_at_the_share_to_which_small_steps_lead(
-    seed: int, lanes: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("seed", "lanes"), [(0, 400), (2, 2000)])
+def test_lanes_lock_at_the_share_to_which_small_steps_lead(seed: int, lanes: int, monkeypatch: Any) -> None:
     """Folds, solutions that run to infinity and kinks, at up to six times the friction."""
-    drawn, start = _drawn(np.random.default_rng(seed), lanes), [np.zeros(lanes)] * 3
+    rng, start = np.random.default_rng(seed), [np.zeros(lanes)] * 3
+    # pins with strong friction: reactions without it, influences, senses, lane last
+    drawn = rng.normal(size=(3, 2, lanes)), rng.normal(size=(3, 3, 2, lanes)) * 0.6, rng.choice([-1.0, 1.0], (3, lanes))
     shares = continuation.follow(lambda x, s: _pins(x, s, *drawn), start, 6.0)[1]
     for name, value in {"FIRST_STEP": 0.004, "LONGEST_STEP": 0.004, "STRAIGHT": 0.0, "MOST_TRIALS": 3000}.items():
         monkeypatch.setattr(continuation, name, value)

@@ -1,6 +1,5 @@
 """Groups by themselves: closed forms against the general group, which is held against finite differences and power."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -90,10 +89,6 @@ def same(a: Any, b: Any, weight: Array, tolerance: float = 1e-10) -> None:
             assert np.all(difference <= tolerance * weight), float(np.max(difference / weight))
 
 
-def size_of(items: Sequence[Any], lanes: int) -> Array:
-    return 1 + np.max([np.abs(np.broadcast_to(n, (lanes,))) for item in items for n in item], axis=0)
-
-
 def joined(text: str, *driven: int) -> General:
     """A group by its joints: kind and both links, x the outside; driven: places of the driven joints."""
     kinds = {"R": "revolute", "P": "prismatic"}
@@ -113,18 +108,13 @@ TOPOLOGIES: dict[str, General] = {
 }  # fmt: skip
 
 
-def regular(group: General, lanes: int, seed: int) -> tuple[Case, Any, Array]:
-    """A case, its pose by Newton from a guess nearby, and the lanes with a condition below 300."""
-    case = Case(group, lanes, seed)
-    pose = group.position(case.elements, case.guess(), case.drive)
-    return case, pose, np.broadcast_to(pose.condition, (lanes,)) < 300
-
-
 @pytest.mark.parametrize("name", TOPOLOGIES)
 def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
     """Outer links and drives move along t; frames differentiated by nested duals in t give the same motion."""
     group = TOPOLOGIES[name]
-    case, pose, good = regular(group, 300, 2)
+    case = Case(group, 300, 2)
+    pose = group.position(case.elements, case.guess(), case.drive)
+    good = np.broadcast_to(pose.condition, (300,)) < 300
     twists_out, seconds_out = case.outer(), case.outer()
     rates = [case.rng.normal(size=300) for _ in group.driven]
     seconds = [case.rng.normal(size=300) for _ in group.driven]
@@ -190,7 +180,8 @@ def test_every_entry_equals_the_general_group(kind: str, offset: float) -> None:
         hit |= here
         actual = [one.frames, *closed.moved(one, *outer), closed.reactions(one, loads)]
         for a, b in zip(actual, expected, strict=True):
-            same(a, b, np.where(here, (1 + offset) * size_of(b, lanes) * np.where(here, pose.condition, 1.0), np.inf))
+            size = 1 + np.max([np.abs(np.broadcast_to(n, (lanes,))) for item in b for n in item], axis=0)
+            same(a, b, np.where(here, (1 + offset) * size * np.where(here, pose.condition, 1.0), np.inf))
         assert np.all(np.broadcast_to(closed.closure(one), (lanes,))[here] < 1e-12 * (1 + offset))
         assert np.all(np.broadcast_to(closed.condition(one), (lanes,))[here] < 1e4)
     assert np.count_nonzero(hit) == np.count_nonzero(good), "each pose belongs to one of the branches"

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from mechanisms import DURANGO, MODELS, analyse, four_bar
+from mechanisms import DURANGO, MODELS, analyse, four_bar, positions_of
 from trunnion import MechanismError
 from trunnion.results import variables as results
 from trunnion.results.save import FORMATS
@@ -24,11 +24,6 @@ export = sys.modules["trunnion.results.save"]
 @pytest.fixture(scope="module")
 def result() -> Any:
     return trunnion.analyse(trunnion.read(DURANGO), 20)
-
-
-@pytest.fixture(scope="module")
-def sliding() -> Any:
-    return analyse(MODELS["slider-crank"](), 15)
 
 
 @pytest.fixture(scope="module")
@@ -91,14 +86,10 @@ def test_reopened_is_the_same_dataset(result: Any, gap: Any, tmp_path: Path, suf
 
 def test_json_is_strict_json(gap: Any, tmp_path: Path) -> None:
     """No NaN or Infinity, which JSON does not have; null in their place; numbers to the last bit."""
-
-    def refuse(word: str) -> None:
-        raise AssertionError(word)
-
     gap = gap.copy(deep=True)
     gap["reaction_force"].values[0, 0, 0] = np.inf
     trunnion.save(gap, tmp_path / "r.json")
-    data = json.loads((tmp_path / "r.json").read_text("utf-8"), parse_constant=refuse)
+    data = json.loads((tmp_path / "r.json").read_text("utf-8"), parse_constant=pytest.fail)
     found = np.array(data["data_vars"]["drive_effort"]["data"][0], float)
     np.testing.assert_array_equal(found, gap["drive_effort"].values[0])
     assert data["data_vars"]["efficiency"]["data"] is None
@@ -239,8 +230,8 @@ def test_what_there_is_not_is_said(asked: dict[str, object], where: str) -> None
         assert "reaction_force" in caught.value.findings[0].remedy
 
 
-def test_csv_columns_of_a_slide(sliding: Any, tmp_path: Path) -> None:
-    trunnion.save(sliding, tmp_path / "r.csv")
+def test_csv_columns_of_a_slide(tmp_path: Path) -> None:
+    trunnion.save(positions_of(MODELS["slider-crank"](), 15), tmp_path / "r.csv")
     header, _ = table(tmp_path / "r.csv")
     assert {"C.slide", "C.slide_velocity", "C.reaction_moment", "C.friction_force", "C.friction_power"} <= set(header)
     assert "C.friction_torque" not in header

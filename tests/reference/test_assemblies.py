@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import trunnion
 from brief import brief
 from mechanisms import MODELS, analyse, build, class_three, findings, four_bar
-from mechanisms_parts import Data, joined
+from mechanisms_parts import Data, corner, joined
 from timed import PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.nested import flat
@@ -91,30 +91,16 @@ def test_a_start_in_line_is_listed_where_its_ways_are_apart() -> None:
     assert np.hypot(*(places[0] - places[1])) > 1e-3
 
 
-def plate_angles(crank: float, turn: float, steps: int = 3600) -> list[float]:
-    """Angles of the plate of `class_three` at which the third rod has its length, with the crank at an angle."""
-    b = crank * np.exp(1j * turn)
-    g, h = 1.4 - 0.15j, 0.55 + 1.9j
-    rod1, rod2, rod3, to_q, to_r = 0.8485, 0.7566, 0.8944, 0.6 + 0j, 0.25 + 0.5j
-    angle = np.linspace(-np.pi, np.pi, steps + 1)
-    with np.errstate(invalid="ignore"):
-        pull = g - to_q * np.exp(1j * angle) - b  # P lies at rod1 from B and at rod2 from the end of this
-        long = np.abs(pull)
-        along = (long**2 + rod1**2 - rod2**2) / (2 * long)
-        across = np.sqrt(rod1**2 - along**2)
-        found = []
-        for side in (1, -1):
-            p = b + pull / long * (along + side * 1j * across)
-            gap = np.abs(p + to_r * np.exp(1j * angle) - h) - rod3
-            crossed = np.flatnonzero(gap[:-1] * gap[1:] < 0)
-            share = gap[crossed] / (gap[crossed] - gap[crossed + 1])
-            found += list(angle[crossed] + share * (angle[1] - angle[0]))
-    return sorted(found)
-
-
 def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
-    choice = choice_of(class_three())
-    angles = []
+    """Angles of the plate at which the third rod has its length, P by the lengths of the other two."""
+    turn = np.linspace(-np.pi, np.pi, 3601)
+    expected: list[float] = []
+    for side in (1, -1):
+        p = corner(0.1, 1.4 - 0.15j - 0.6 * np.exp(1j * turn), 0.8485, 0.7566, side)
+        gap = np.abs(p + (0.25 + 0.5j) * np.exp(1j * turn) - (0.55 + 1.9j)) - 0.8944
+        crossed = np.flatnonzero(gap[:-1] * gap[1:] < 0)
+        expected += list(turn[crossed] + gap[crossed] / (gap[crossed] - gap[crossed + 1]) * (turn[1] - turn[0]))
+    choice, angles = choice_of(class_three()), []
     for way in choice.ways:
         p, q, r = (complex(*way.joints[pin]) for pin in "PQR")
         assert abs(p - 0.1) == pytest.approx(0.8485, abs=1e-12)
@@ -122,7 +108,7 @@ def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
         assert abs(r - (0.55 + 1.9j)) == pytest.approx(0.8944, abs=1e-12)
         assert (r - p) / (q - p) == pytest.approx((0.25 + 0.5j) / 0.6, abs=1e-12)
         angles.append(float(np.angle(q - p)))
-    assert sorted(angles) == pytest.approx(plate_angles(0.1, 0.0), abs=1e-4)
+    assert sorted(angles) == pytest.approx(sorted(expected), abs=1e-4)
 
 
 @pytest.mark.spread(1)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.linalg import inv
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
@@ -145,14 +146,6 @@ def leaned_by(slope: Array, way: Array) -> Array:
     return found
 
 
-def back(there: Array) -> Array:
-    """The inverse of homogeneous matrices."""
-    found = np.array(there)
-    found[..., :3, :3] = np.swapaxes(there[..., :3, :3], -1, -2)
-    found[..., :3, 3:] = -found[..., :3, :3] @ there[..., :3, 3:]
-    return found
-
-
 class Loop:
     """The closure of the four-bar in homogeneous matrices, no code shared with the library; (…, turns or ends)."""
 
@@ -177,10 +170,10 @@ class Loop:
 
     def open(self, q: Array, c: Array) -> Array:
         """Turn and way (over the ground's length) by which the rocker misses its bearing; c (…, joint, end, 2)."""
-        at = self.turned @ back(self.hole("A", c[..., 0, :, :]))
-        at = at @ self.driven @ turned(q[..., 0]) @ back(self.hole("B", c[..., 1, :, :]))
-        at = at @ self.along @ turned(q[..., 1]) @ back(self.hole("C", c[..., 2, :, :]))
-        missing = back(self.ground @ turned(q[..., 2])) @ at @ self.hole("D", c[..., 3, :, :])
+        at = self.turned @ inv(self.hole("A", c[..., 0, :, :]))
+        at = at @ self.driven @ turned(q[..., 0]) @ inv(self.hole("B", c[..., 1, :, :]))
+        at = at @ self.along @ turned(q[..., 1]) @ inv(self.hole("C", c[..., 2, :, :]))
+        missing = inv(self.ground @ turned(q[..., 2])) @ at @ self.hole("D", c[..., 3, :, :])
         turn = [missing[..., i, j] - missing[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))]
         way = [missing[..., i, 3] / LENGTHS[0] for i in range(3)]
         return np.stack([*(one / 2 for one in turn), *way], axis=-1)
@@ -206,19 +199,14 @@ class Loop:
             step = 1e-4
             return 2 * rows(x) @ ((rows(x + step * np.eye(19)) - rows(x - step * np.eye(19))) / (2 * step)).T
 
-        def room(x: Array) -> Array:
-            return np.asarray(1 - (x[3:].reshape(8, 2) ** 2).sum(axis=1))
-
-        def room_slope(x: Array) -> Array:
-            found = np.zeros((8, 19))
-            for k in range(8):
-                found[k, 3 + 2 * k : 5 + 2 * k] = -2 * x[3 + 2 * k : 5 + 2 * k]
-            return found
-
+        room = {  # each end within the radius
+            "type": "ineq", "fun": lambda x: 1 - np.sum(x[3:].reshape(8, 2) ** 2, axis=1),
+            "jac": lambda x: np.hstack([np.zeros((8, 3)), -2 * np.kron(np.eye(8), [1, 1]) * x[3:]]),
+        }  # fmt: skip
         start = np.append(rng.uniform(-1, 1, 3), rng.uniform(-0.7, 0.7, 16))
         found = minimize(
-            lambda x: float(np.sum(rows(x) ** 2)), start, jac=slope, method="SLSQP",
-            constraints={"type": "ineq", "fun": room, "jac": room_slope}, options={"ftol": 1e-16, "maxiter": 400},
+            lambda x: float(np.sum(rows(x) ** 2)), start, jac=slope, method="SLSQP", constraints=room,
+            options={"ftol": 1e-16, "maxiter": 400},
         )  # fmt: skip
         return float(np.max(np.abs(rows(found.x))))
 

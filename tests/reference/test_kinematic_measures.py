@@ -150,18 +150,6 @@ def test_speeds_in_space_by_differences(spatial: Run) -> None:
         course(spatial, "transmission_angle:A", time)
 
 
-def books() -> Mechanism:
-    """A slider-crank with friction, a load that does work, two springs, and measures of its own."""
-    data = slider_crank(R, L, 0.1)
-    data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N", "useful": True}
-    data["springs"] = {
-        "line": {"between": ["ground.A", "rod.P"], "stiffness": "1 kN/m", "free_length": "0.2 m", "damping": "3 N s/m"},
-        "coil": {"joint": "P", "stiffness": "2 N m/rad", "free_angle": "10 deg"},
-    }
-    data["measures"] = {"speed": {"velocity": "piston.P"}, "swing": {"stroke": "C"}}
-    return build(data, friction=0.1)
-
-
 PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and where
     "effort:A": ("drive_effort", {"driver": "A"}), "power:A": ("drive_power", {"driver": "A"}),
     "reaction:P.y": ("reaction_force", {"joint": "P", "axis": "y"}), "rotation:P": ("joint_rotation", {"joint": "P"}),
@@ -175,7 +163,14 @@ PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and wh
 
 def test_measures_are_the_numbers_of_the_analysis() -> None:
     """At every position, and over the cycle: efficiency, root mean square, energy lost, and those the model states."""
-    mechanism = books()
+    data = slider_crank(R, L, 0.1)
+    data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N", "useful": True}
+    data["springs"] = {
+        "line": {"between": ["ground.A", "rod.P"], "stiffness": "1 kN/m", "free_length": "0.2 m", "damping": "3 N s/m"},
+        "coil": {"joint": "P", "stiffness": "2 N m/rad", "free_angle": "10 deg"},
+    }
+    data["measures"] = {"speed": {"velocity": "piston.P"}, "swing": {"stroke": "C"}}
+    mechanism = build(data, friction=0.1)
     run, result = prepare(mechanism), trunnion.analyse(mechanism, 24)
     time = result["time"].values
     for name, (variable, where) in PARTS.items():
@@ -307,12 +302,9 @@ def test_an_expression_that_is_its_own_circle_or_means_nothing_is_a_finding() ->
         ("2 * lead", "itself"), ("input - ab", "added"), ("high - low", "at every position"), ("__import__('os')", ""),
         ("swing + input", "without place, range"),
     ]:  # fmt: skip
-        own = {
-            "input": "A.rotation", "lead": text, "high": {"stroke": "D"}, "low": {"stroke": "D"},
-            "swing": {"expression": "input", "as": "maximum"},
-        }  # fmt: skip
+        swing = {"expression": "input", "as": "maximum"}
         with pytest.raises(MechanismError) as error:
-            model(**own)
+            model(input="A.rotation", lead=text, high={"stroke": "D"}, low={"stroke": "D"}, swing=swing)
         assert all(one.where.startswith("measures.lead") for one in error.value.findings), text
         assert says in str(error.value), text
 

@@ -202,7 +202,6 @@ def test_efforts_and_reactions_have_no_maximum_where_they_grow_without_bound(loc
         assert (figures[name].value, figures[name].note) == (None, "no bound" + ": it locks there" * locks)
 
 
-Numbers = Any
 MOMENTS, MECHANISMS, ALONE = 24, 20, slice(None, None, 5)
 SAME = 1e-9
 NEARLY = 1e-3  # of the margin, below and above which it is looked whether a position locks
@@ -244,14 +243,10 @@ def shafts(rng: np.random.Generator) -> Mechanism:
     return Mechanism.model_validate(data)
 
 
-def two_groups(rng: np.random.Generator) -> Mechanism:
-    """The ram below, at coefficients of which it runs, one group locks or both."""
-    return ram(rng.uniform(0.4, 2.0), rng.choice([0.0, 400.0]))
-
-
 DRAWN: dict[str, Callable[[np.random.Generator], Mechanism]] = {
     "slider-crank": pressed_slider, "four-bar": crank_and_rocker, "RSSR": ball_rods, "RCCC": shafts,
-    "two groups": two_groups,
+    # the ram below, at coefficients of which it runs, one group locks or both
+    "two groups": lambda rng: ram(rng.uniform(0.4, 2.0), rng.choice([0.0, 400.0])),
 }  # fmt: skip
 CASES = [pytest.param(name, seed, id=f"{name}-{seed}") for name in DRAWN for seed in range(MECHANISMS)]
 
@@ -260,13 +255,13 @@ def prepared(name: str, seed: int) -> Run:
     return prepare(DRAWN[name](np.random.default_rng(seed)))
 
 
-def margins(run: Run, time: Numbers) -> Numbers:
+def margins(run: Run, time: Any) -> Any:
     with np.errstate(all="ignore"):
         back = run.solve(time, method=FrictionMethod(margin_up_to=10.0))
         return np.broadcast_to(locking_margin(back), time.shape).copy()
 
 
-def locked(run: Run, time: Numbers, multiple: Numbers) -> Numbers:
+def locked(run: Run, time: Any, multiple: Any) -> Any:
     with np.errstate(all="ignore"):
         back = run.solve(time, method=FrictionMethod(multiple=multiple))
         return np.broadcast_to(np.less(back.share, 1.0), time.shape)

@@ -68,18 +68,14 @@ def bumper() -> Mechanism:
     return Mechanism(**data, springs={"bumper": {**spring, "only": "push"}})
 
 
-def example(name: str) -> Mechanism:
-    return trunnion.read(EXAMPLES / f"{name}.yaml")
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("mechanism", "steps", "same", "cells", "close"),
     [
         *((lambda force=force: press(force), (60, 720), 1e-9, 360_000, 2e-4) for force in LOADS),
         (bumper, (60, 720), 1e-7, 200_000, 1e-5),
-        (lambda: example("rssr"), (50, 333), 1e-6, 60_000, 1e-4),
-        (lambda: example("klann"), (50, 333), 1e-6, 60_000, 1e-4),
+        (lambda: trunnion.read(EXAMPLES / "rssr.yaml"), (50, 333), 1e-6, 60_000, 1e-4),
+        (lambda: trunnion.read(EXAMPLES / "klann.yaml"), (50, 333), 1e-6, 60_000, 1e-4),
     ],
     ids=["drive", "pulse", "time", "bumper", "rssr", "klann"],
 )

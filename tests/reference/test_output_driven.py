@@ -84,22 +84,7 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
 
 
 def test_a_hand_that_two_drivers_move() -> None:
-    """A five-bar whose hand is led along two slides: the power of both motors is that of forces at the hand."""
-    data = hand()
-    led = {"X": {"law": "cycloidal", "range": [0.05, 0.12], "duration": 1.0, "returns": False},
-           "Y": {"law": "cycloidal", "range": [0.2, 0.16], "duration": 1.0, "returns": False}}  # fmt: skip
-    driven = brief(Mechanism(**{**data, "drivers": led}), steps=40)
-    motors = {"A": {"moves": "X", **led["X"]}, "D": {"moves": "Y", **led["Y"]}}
-    found = brief(Mechanism(**{**data, "drivers": motors}), steps=40)
-    power = driven.drive_power.sum("driver").values
-    assert found.drive_power.sum("driver").values == pytest.approx(power, abs=1e-9 * np.max(np.abs(power)))
-    for joint in ("X", "Y"):
-        slides = (one.joint_slide.sel(joint=joint).values for one in (found, driven))
-        np.testing.assert_allclose(*slides, atol=1e-12)
-
-
-def hand() -> dict[str, Any]:
-    """Two cranks A and D, two rods to a hand H, which slides along y on a slide along x."""
+    """Two cranks A and D, two rods to a hand, led along two slides: the motors' power is that of forces at the hand."""
     x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
     bars = {"left": ("A", "B", 0.4, 0.15), "right": ("D", "C", 0.4, 0.15), "rod": ("B", "H", 0.3, 0.18),
             "other": ("C", "J", 0.3, 0.18)}  # fmt: skip
@@ -113,12 +98,18 @@ def hand() -> dict[str, Any]:
         "hand": {"points": {"Y": y, "H": [0, 0], "J": [0, 0]}, "mass": 2.0},
     }
     joints = joined("ground -A- left -B- rod -H- hand, ground -D- right -C- other -J- hand, ground =X= sledge =Y= hand")
-    return {
-        "gravity": [0, -9.81],
-        "links": links,
-        "joints": joints,
-        "assembly": {"B": [-0.08, 0.12], "C": [0.23, 0.12], "H": [0.05, 0.2]},
-    }
+    hints = {"B": [-0.08, 0.12], "C": [0.23, 0.12], "H": [0.05, 0.2]}
+    data = {"gravity": [0, -9.81], "links": links, "joints": joints, "assembly": hints}
+    led = {"X": {"law": "cycloidal", "range": [0.05, 0.12], "duration": 1.0, "returns": False},
+           "Y": {"law": "cycloidal", "range": [0.2, 0.16], "duration": 1.0, "returns": False}}  # fmt: skip
+    driven = brief(Mechanism(**{**data, "drivers": led}), steps=40)
+    motors = {"A": {"moves": "X", **led["X"]}, "D": {"moves": "Y", **led["Y"]}}
+    found = brief(Mechanism(**{**data, "drivers": motors}), steps=40)
+    power = driven.drive_power.sum("driver").values
+    assert found.drive_power.sum("driver").values == pytest.approx(power, abs=1e-9 * np.max(np.abs(power)))
+    for joint in ("X", "Y"):
+        slides = (one.joint_slide.sel(joint=joint).values for one in (found, driven))
+        np.testing.assert_allclose(*slides, atol=1e-12)
 
 
 def test_past_a_dead_centre_there_is_no_position() -> None:

@@ -214,21 +214,15 @@ NAMES = [
 STEPS = 16
 
 
-def in_space(data: Data) -> Data:
-    """The same model in space, its pins with a length."""
-    data, defaults = raised(data), data["joint_defaults"]
-    pin = {**defaults["pin"], "bearing": 0.05}
-    return {**data, "over_constraint": "minimum-norm", "joint_defaults": {**defaults, "pin": pin}}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("friction", [None, 0.12])
 @pytest.mark.parametrize("name", NAMES)
 def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
     """Motion to 1e-10, forces to 1e-8 of the largest; nothing across the plane, where friction is refused for that."""
-    data = model(MODELS[name](), friction=friction)
+    data = raised(model(MODELS[name](), friction=friction)) | {"over_constraint": "minimum-norm"}
+    data["joint_defaults"] |= {"pin": {**data["joint_defaults"]["pin"], "bearing": 0.05}}
     flat = brief(build(MODELS[name](), friction=friction), STEPS)
-    space = brief(trunnion.Mechanism(trunnion=1, **in_space(data)), STEPS, refuse=False)
+    space = brief(trunnion.Mechanism(trunnion=1, **data), STEPS, refuse=False)
     np.testing.assert_array_equal(flat.status.values, space.status.values)
     points = [p for p in flat.point.values if p in space.point.values]
     for what, limit in (("position", 1e-10), ("velocity", 1e-9), ("acceleration", 1e-8)):
@@ -255,23 +249,19 @@ def coupled_wheels(stiffness: dict[str, float]) -> Data:
     feet = {"A": (0.0, 0.0), "B": (1.2, 0.0), "C": (1.7, 0.9)}
     pins = dict(zip(feet, "DEF", strict=True))
     links: Data = {"ground": {"points": {name: list(place) for name, place in feet.items()}}}
-    joints: Data = {}
     for name, pin in pins.items():
         links[f"wheel-{name}"] = {"points": {name: [0, 0], pin: [0.3, 0]}, "mass": 20.0, "inertia": 0.5}
-        joints[name] = {"type": "revolute", "links": ["ground", f"wheel-{name}"]}
-        joints[pin] = {"type": "revolute", "links": [f"wheel-{name}", "rod"]}
     rod = {pin: list(feet[name]) for name, pin in pins.items()}
     links["rod"] = {"points": rod, "mass": 30.0, "inertia": 8.0, "centre": [1.0, 0.1]}
-    for name, radial in stiffness.items():
-        joints[name]["stiffness"] = {"radial": radial}
     return {
         "over_constraint": "minimum-norm",
         "gravity": [0, -9.81],
         "links": links,
-        "joints": joints,
+        "joints": joined("ground -A- wheel-A -D- rod, ground -B- wheel-B -E- rod, ground -C- wheel-C -F- rod",
+                         **{name: {"stiffness": {"radial": radial}} for name, radial in stiffness.items()}),
         "drivers": {"A": {"speed": 10.0, "range": [0.4, 2.6]}},
         "loads": {"pull": {"joint": "C", "resisting_torque": 100.0, "useful": True}},
-    }
+    }  # fmt: skip
 
 
 def test_three_wheels_share_their_load_by_stiffness() -> None:

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import trunnion
+from mechanisms_parts import joined
 from toleranced import FOURBAR, fourbar, fourbar_angle, slider_crank
 from trunnion import Mechanism, tolerance
 from trunnion.studies.allocation.allocate import half_widths
@@ -175,11 +176,7 @@ ROD = {
         "rod": {"points": {"O": [0, 0], "P": ["a + b", 0]}},
         "block": {"points": {"P": [0, 0], "G": {"at": [0, 0], "axis": [1, 0]}}},
     },
-    "joints": {
-        "O": {"type": "revolute", "links": ["ground", "rod"]},
-        "P": {"type": "revolute", "links": ["rod", "block"]},
-        "G": {"type": "prismatic", "links": ["ground", "block"]},
-    },
+    "joints": joined("ground -O- rod -P- block, ground =G= block"),
     "assembly": {"P": [0.09, 0.04]},
     "dimensions": {"a": "60 mm", "b": "40 mm", "h": "40 mm"},
     "measures": {"angle": {"angle": "rod"}},

@@ -34,10 +34,7 @@ def planar(name: str, **options: Any) -> Callable[[], Data]:
 
 
 def spatial(name: str) -> Callable[[], Data]:
-    def data() -> Data:
-        return mechanisms_space.MODELS[name]().data | {"joint_defaults": {"friction": 0.05}}
-
-    return data
+    return lambda: mechanisms_space.MODELS[name]().data | {"joint_defaults": {"friction": 0.05}}
 
 
 def example(name: str) -> Callable[[], Data]:
@@ -50,20 +47,17 @@ def example(name: str) -> Callable[[], Data]:
     return data
 
 
-def one_law(name: str) -> Callable[[], Data]:
-    return planar("slider-crank", friction=mechanisms.law_named(name))
-
-
 CASES: dict[str, Callable[[], Data]] = {
     **{name: planar(name) for name in mechanisms.MODELS},
-    **{f"{name} friction": one_law(name) for name in ("stribeck", "brown-mcphee", "viscous", "dahl", "lugre")},
+    **{f"{law} friction": planar("slider-crank", friction=mechanisms.law_named(law))
+       for law in ("stribeck", "brown-mcphee", "viscous", "dahl", "lugre")},
     **{name: spatial(name) for name in ("RSSR", "RCCC", "RCSC, two drivers", "two loops in one group")},
     "Cardan": mechanisms_space.cardan,
     "lamp": example("spring-balanced-lamp"),
     "Cardan's circles": example("cardan-gears"),
     "press": example("toggle-press"),
     "table": example("swash-plate-pump"),
-}
+}  # fmt: skip
 
 
 def measures_of(run: Run) -> list[str]:

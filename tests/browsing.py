@@ -2,17 +2,13 @@
 
 import re
 import shutil
+from itertools import pairwise
 
 import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-QUIET = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+QUIET = ["--no-sandbox", "--disable-quic", "--disable-background-networking", "--disable-component-update",
+         "--disable-sync"]  # fmt: skip
 HERE = re.compile(r"(http|ws)://127\.0\.0\.1:|data:|blob:")
 
 
@@ -50,9 +46,10 @@ class User:
             pytest.fail("the page is never idle")
         self.page.wait_for_timeout(20)
 
-    def until(self, words):
+    def until(self, words, module="state"):
+        """Wait for something of a module, `m`; of `state` it is `s`, too."""
         for _ in range(400):
-            if self.state(f"Boolean({words})"):
+            if self.of(module, f"(s => Boolean({words}))(m)"):
                 return self.idle()
             self.page.wait_for_timeout(25)
         return pytest.fail(f"never: {words}")
@@ -87,15 +84,12 @@ class User:
 
     def draw_four_bar(self):
         """By mouse: three links, the crank driven."""
-        for one, other, *grounded in (
-            ((200, 350), (250, 270), True, False),
-            ((250, 270), (520, 180), False, False),
-            ((520, 180), (480, 350), False, True),
-        ):
+        places = (200, 350), (250, 270), (520, 180), (480, 350)
+        for k, (one, other) in enumerate(pairwise(places)):
             self.keys("l")
-            self.click(*one, shift=grounded[0])
+            self.click(*one, shift=k == 0)
             steps = self.state("s.past.value.length")
-            self.click(*other, shift=grounded[1])
+            self.click(*other, shift=k == 2)
             self.until(f"s.past.value.length > {steps}")  # else what follows may come before the link is there
             self.keys("Escape")
         self.keys("d")

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from mechanisms import DURANGO, MODELS, analyse, four_bar, positions_of
+from mechanisms import DURANGO, MODELS, analyse, four_bar
 from trunnion import MechanismError
 from trunnion.results import variables as results
 from trunnion.results.save import FORMATS
@@ -231,7 +231,7 @@ def test_what_there_is_not_is_said(asked: dict[str, object], where: str) -> None
 
 
 def test_csv_columns_of_a_slide(tmp_path: Path) -> None:
-    trunnion.save(positions_of(MODELS["slider-crank"](), 15), tmp_path / "r.csv")
+    trunnion.save(analyse(MODELS["slider-crank"](), 15), tmp_path / "r.csv")
     header, _ = table(tmp_path / "r.csv")
     assert {"C.slide", "C.slide_velocity", "C.reaction_moment", "C.friction_force", "C.friction_power"} <= set(header)
     assert "C.friction_torque" not in header

@@ -15,18 +15,6 @@ from trunnion.studio.answers import answer
 FOURBAR = "durango-fourbar"
 
 
-def drawn_four_bar():
-    """A four-bar drawn from nothing, its crank driven."""
-    return edited(
-        "",
-        {},
-        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.05, 0.05]},
-        {"do": "link", "from": "link1.B", "to": [0.2, 0.12]},
-        {"do": "link", "from": "link2.C", "to": {"ground": [0.18, 0.0]}},
-        {"do": "driver", "joint": "A", "speed": "60 rpm"},
-    )
-
-
 def test_the_answer_bears_the_question():
     found = unpacked(answer(b'{"ask": "start", "revision": 7}'))
     assert (found["ask"], found["revision"], found["version"]) == ("start", 7, trunnion.__version__)
@@ -74,7 +62,7 @@ def test_a_model_reads_no_other_file():
 
 def test_the_cycle_is_that_of_analyse():
     found = ask(ask="model", text=EXAMPLES[FOURBAR])
-    result = trunnion.analyse(model_of(EXAMPLES[FOURBAR]), 360)
+    result = analysed(EXAMPLES[FOURBAR])
     (driver,) = found["scene"]["drivers"]
     np.testing.assert_allclose(driver["effort"], result.drive_effort.values[0], rtol=6e-7)
     assert found["margin_least"]["beyond"]
@@ -124,10 +112,8 @@ def test_a_name_is_changed_wherever_it_stands():
     np.testing.assert_allclose(analysed(text, 36).drive_effort, before.drive_effort, rtol=1e-12)
     assert len(text.splitlines()) == len(EXAMPLES[FOURBAR].splitlines())  # and what is on each, in its place
     assert "\n  AB: 2.00 m\n  length: 6.00 m\n  CD: 3.00 m\n" in text
-    assert (
-        "\n  rod: {points: {B: [0, 0], K: [length, 0], E: [BE * cos(gamma), BE * sin(gamma)]},\n            mass"
-        in text
-    )
+    rod = "  rod: {points: {B: [0, 0], K: [length, 0], E: [BE * cos(gamma), BE * sin(gamma)]},"
+    assert f"\n{rod}\n            mass" in text
 
 
 def test_what_is_deleted_leaves_the_other_lines_as_they_are():
@@ -154,9 +140,8 @@ def test_links_of_three_joints_keep_the_others(joint):
     to = np.add(before[joint], [0.01, -0.007])
     after = places(ask(ask="drag", text=text, point=joint, index=index, to=list(to))["points"])
     for name, place in before.items():
-        np.testing.assert_allclose(
-            after[name], to if place == pytest.approx(before[joint]) else place, atol=1e-6, err_msg=name
-        )
+        there = to if place == pytest.approx(before[joint]) else place
+        np.testing.assert_allclose(after[name], there, atol=1e-6, err_msg=name)
 
 
 def test_a_drop_writes_what_the_drag_showed():
@@ -178,18 +163,15 @@ def test_a_drop_writes_what_the_drag_showed():
 @pytest.mark.parametrize(
     ("name", "path", "written", "value"),
     [
-        (FOURBAR, "dimensions.BC", {"BC: 6.00 m": "BC: 5.7 m"}, 5.7),
-        ("drawing-press", "dimensions.L", {"L: 200 mm": "L: 210 mm"}, 0.21),
-        ("elliptic-trammel", "dimensions.b", {"b: 90 mm": "b: 92 mm"}, 0.092),
+        (FOURBAR, "dimensions.BC", ("BC: 6.00 m", "BC: 5.7 m"), 5.7),
+        ("drawing-press", "dimensions.L", ("L: 200 mm", "L: 210 mm"), 0.21),
+        ("elliptic-trammel", "dimensions.b", ("b: 90 mm", "b: 92 mm"), 0.092),
     ],
 )
 def test_a_number_that_is_tried_gives_the_cycle_of_a_model_that_has_it(name, path, written, value, friction):
-    text = EXAMPLES[name]
-    for old, new in written.items():
-        assert old in text
-        text = text.replace(old, new)
-    mechanism = model_of(text)
-    result = trunnion.analyse(mechanism if friction == "stated" else mechanism.with_friction("off"), 360)
+    text = EXAMPLES[name].replace(*written)
+    assert text != EXAMPLES[name]
+    result = analysed(text, friction=friction == "stated")
     scene = ask(ask="model", text=text, friction=friction)["scene"]
     for index in (0, 100, 250):
         tried = ask(ask="try", text=EXAMPLES[name], values={path: value}, index=index, friction=friction)
@@ -270,7 +252,7 @@ def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
 
 
 def test_what_has_no_length_is_refused():
-    text, places = drawn_four_bar()
+    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.05, 0.05]})
     found = ask(ask="edit", text=text, places=places, gestures=[{"do": "move", "point": "B", "to": places["link1.A"]}])
     assert "no length" in found["error"]
 
@@ -286,13 +268,10 @@ def test_the_other_assembly_is_one_click_away():
     assert ask(ask="model", text=text)["places"]["rocker.C"] == pytest.approx(ghost["rocker.C"])
 
 
-SHORT_ROCKER = {"AD: 5.50 m": "AD: 4.2 m", "AB: 2.00 m": "AB: 2.6 m", "CD: 3.00 m": "CD: 1.2 m"}
-
-
 def test_the_least_margin_is_that_of_a_position_that_has_one():
     """The first positions cannot be assembled, the others are far from locking; the least is between two positions."""
     text = EXAMPLES[FOURBAR]
-    for old, new in SHORT_ROCKER.items():
+    for old, new in (("AD: 5.50 m", "AD: 4.2 m"), ("AB: 2.00 m", "AB: 2.6 m"), ("CD: 3.00 m", "CD: 1.2 m")):
         text = text.replace(old, new)
     found = ask(ask="model", text=text)
     assert found["margin"][0] is None
@@ -356,7 +335,7 @@ def test_friction_that_is_not_whole_leaves_the_motion():
     assert found["solved"]
     assert found["bare"]
     assert "banana" in found["findings"][0]["what"]
-    plain = trunnion.analyse(model_of(EXAMPLES[FOURBAR]).with_friction("off"), 360)
+    plain = analysed(EXAMPLES[FOURBAR], friction=False)
     np.testing.assert_allclose(found["scene"]["drivers"][0]["effort"], plain["drive_effort"].values[0], rtol=6e-7)
     assert "banana" in ask(ask="export", text=text, what="csv")["error"]
     worse = ask(ask="model", text=text.replace("BC: 6.00 m", "BC: 6.00 kg"))

@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-import trunnion
 from brief import brief
 from studio.asking import EXAMPLES, FLOAT, analysed, ask, column, near, sound
 from studio.test_whitworth import TEXT as RAM
@@ -70,9 +69,8 @@ def test_a_point_moves_across_its_line_to_the_instant_centre():
     """v = ω × (P − I), with the angular velocity of `analyse`."""
     text = EXAMPLES[FOURBAR]
     result = analysed(text)
-    (row,) = [
-        one for one in sound("layers", text, wanted=["centres"])["centres"] if one["pair"] == ["ground", "coupler"]
-    ]
+    rows = sound("layers", text, wanted=["centres"])["centres"]
+    (row,) = [one for one in rows if one["pair"] == ["ground", "coupler"]]
     x, y = (result["point_position"].sel(point="coupler.E", axis=axis).values for axis in "xy")
     turn = result["link_angle_velocity"].sel(link="coupler").values
     fit = np.hypot(column(row["x"]) - x, column(row["y"]) - y) < 100  # m: nearer than float32 has digits for
@@ -117,13 +115,11 @@ def compared(before, after, friction=("stated", "stated"), **rest):
     other = {"text": before, "friction": friction[0]}
     told = sound("compare", after, friction=friction[1], others=[other], **rest)
     (found,) = told["others"]
-    was = {row["name"]: row for row in found["figures"]}
-    none = {"value": None, "text": "—"}
-    rows = {}
-    for row in told["figures"]:
-        old = was.get(row["name"], none)
-        rows[row["title"]] = {"a": old["value"], "b": row["value"], "texts": [old["text"], row["text"]]}
-    return found, rows
+    was, none = {row["name"]: row for row in found["figures"]}, {"value": None, "text": "—"}
+    pairs = [(was.get(row["name"], none), row) for row in told["figures"]]
+    return found, {
+        row["title"]: {"a": old["value"], "b": row["value"], "texts": [old["text"], row["text"]]} for old, row in pairs
+    }
 
 
 def test_a_table_of_two_variants_is_that_of_two_analyses():
@@ -131,23 +127,18 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
     assert before != after
     found, rows = compared(before, after, steps=60)
     results = [analysed(one, steps=60) for one in (before, after)]
-    peaks = [{figure.name: figure.value for figure in one.trunnion.summary}["Z.effort_max"] for one in results]
+    figures = [{figure.name: figure.value for figure in one.trunnion.summary} for one in results]
+    peaks = [one["Z.effort_max"] for one in figures]
     assert peaks == pytest.approx([float(np.abs(one["drive_effort"]).max()) for one in results], rel=1e-11)
     (effort,) = [row for label, row in rows.items() if label.startswith("drive force of Z, maximum")]
     assert [effort["a"], effort["b"]] == pytest.approx(peaks, rel=1e-12)
-    figures = [{figure.name: figure.value for figure in one.trunnion.summary} for one in results]
-    for label, name in (
-        ("efficiency of the cycle", "efficiency"),
-        ("locking margin, minimum", "locking_margin"),
-    ):
+    for label, name in (("efficiency of the cycle", "efficiency"), ("locking margin, minimum", "locking_margin")):
         assert [rows[label]["a"], rows[label]["b"]] == pytest.approx([one[name] for one in figures], rel=1e-12)
     lost = [float(one["friction_power_mean"].sum()) for one in results]
     assert [rows["friction power, mean"][key] for key in "ab"] == pytest.approx(lost, rel=1e-9)
     least = [float(one["locking_margin"].min()) for one in results]
     assert least[1] == pytest.approx(least[0] / 1.5, rel=1e-3)  # a multiple of the friction
-    reaction = [
-        float(np.hypot(*(one["reaction_force"].sel(axis=axis, joint="O") for axis in "xy")).max()) for one in results
-    ]
+    reaction = [float(np.hypot(*one["reaction_force"].sel(joint="O").values).max()) for one in results]
     row = rows["reaction of O, maximum"]
     assert [row["a"], row["b"]] == pytest.approx([one["O.reaction_max"] for one in figures], rel=1e-12)
     assert [row["a"], row["b"]] == pytest.approx(reaction, rel=1e-11)  # of the positions
@@ -218,9 +209,7 @@ def test_the_margin_does_not_jump_where_a_joint_turns_round(name, index):
     rough, stated = re.sub(r"friction: 0\.\d+", "friction: 0.2", text), float(re.search(r"friction: (0\.\d+)", text)[1])
     live = ask(ask="try", text=rough, values={}, index=index)["margin"]
     assert live == {"value": pytest.approx(margin[index] * stated / 0.2, rel=1e-6), "beyond": False}
-    (figure,) = [
-        one for one in trunnion.analyse(mechanism_of(text, {})).trunnion.summary if one.name == "locking_margin"
-    ]
+    (figure,) = [one for one in analysed(text).trunnion.summary if one.name == "locking_margin"]
     assert cycle["margin_least"]["value"] == pytest.approx(figure.value, rel=1e-9)
     assert f"at {cycle['margin_least']['at']}" == figure.place
 

@@ -19,23 +19,6 @@ def number(text):
     return float(text.replace("\u202f", "").replace("−", "-").split("\u00a0")[0].split()[0])
 
 
-def laid(user, words):
-    return user.of("layers", f"(l => {words})(m)")
-
-
-def variant(user, words):
-    return user.of("variants", f"(v => {words})(m)")
-
-
-def until(user, module, words):
-    """Wait for what a module knows."""
-    for _ in range(400):
-        if user.of(module, f"Boolean({words})"):
-            return user.idle()
-        user.page.wait_for_timeout(25)
-    return pytest.fail(f"never: {words}")
-
-
 def written(user, text):
     user.of("actions", "m.takeText(given, 'Edit')", text)
     user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
@@ -52,8 +35,8 @@ def show(user, *names):
 def test_the_radius_of_a_friction_circle_is_that_of_coulomb(user):
     """f′ r = 0.40 · 7.5 mm; the two forces and the moment together act along a line that touches the circle."""
     show(user, "Friction circles")
-    until(user, "layers", "m.laid.value?.circles")
-    result, found = analysed(user.state("s.text.value")), laid(user, "l.laid.value.circles")
+    user.until("m.laid.value?.circles", "layers")
+    result, found = analysed(user.state("s.text.value")), user.of("layers", "m.laid.value.circles")
     assert [one["joint"] for one in found] == list("ABCD")
     for one in found:
         np.testing.assert_allclose(np.array(one["radius"], float), 0.4 * 0.0075, rtol=1e-6)
@@ -67,7 +50,7 @@ def test_the_radius_of_a_friction_circle_is_that_of_coulomb(user):
         torque = result["friction_torque"].sel(joint=one["joint"]).values
         np.testing.assert_allclose(moment[moves], torque[moves], rtol=1e-5)
     user.state("s.friction.value = 'off'")
-    until(user, "layers", "m.laid.value?.circles?.length === 0")
+    user.until("m.laid.value?.circles?.length === 0", "layers")
     show(user, "Friction circles")
     user.state("s.friction.value = 'stated'")
     user.idle()
@@ -94,7 +77,7 @@ def test_two_variants_are_compared(user):
     moving = user.page.locator(".chart", has_text="Velocity of").locator(".legend .label").all_inner_texts()
     assert moving[0] == "magnitude"
     assert user.page.locator(".chart", has_text="Velocity of").locator("path.curve.variant").count() == 3
-    overlaid = variant(user, "v.compared.value[0].scene.drivers[0].effort")
+    overlaid = user.of("variants", "m.compared.value[0].scene.drivers[0].effort")
     own = results[0]["drive_effort"].values[0]
     np.testing.assert_allclose(overlaid, own, atol=FLOAT * np.abs(own).max())
     assert user.page.locator("path.outline-of-variant").count() == 4  # three links and the key

@@ -202,11 +202,11 @@ def test_another_file_is_replaced_only_where_that_is_said(served, content):
     """What is there is looked at in the folder, under the name with its ending."""
     there = served.folder / "compose.yaml"
     there.write_bytes(content)
-    for how in (
-        {},
-        {"opened": "compose.yaml", "saved": "as it was"},
+    other, former = (
         {"opened": "other.yaml", "saved": "services: {}\n"},
-    ):
+        {"opened": "compose.yaml", "saved": "as it was"},
+    )
+    for how in ({}, former, other):
         status, told = saved(served, "compose", "name: mine", **how)
         assert (status, told["existing"]) == (409, "compose.yaml")
         assert there.read_bytes() == content
@@ -217,14 +217,8 @@ def test_another_file_is_replaced_only_where_that_is_said(served, content):
 
 
 def test_a_file_that_comes_while_another_is_saved_stays(served, monkeypatch):
-    there = served.folder / "race.yaml"
-    touch = Path.touch
-
-    def late(path, **how):
-        there.write_text("first", "utf-8")
-        touch(path, **how)
-
-    monkeypatch.setattr(Path, "touch", late)
+    there, touch = served.folder / "race.yaml", Path.touch
+    monkeypatch.setattr(Path, "touch", lambda path, **how: there.write_text("first", "utf-8") and touch(path, **how))
     assert saved(served, "race", "second")[0] == 400
     assert there.read_text("utf-8") == "first"
     there.unlink()

@@ -122,9 +122,7 @@ def test_a_watt_six_bar_closed_by_joins_is_the_typed_one(user, by):
     hand.tool("v", "Select")
     user.until("s.solved.value")
     rubbing = {"do": "set", "path": ["joint_defaults"], "value": RUBBING}
-    pivot = user.state(
-        "Object.keys(s.answer.value.entries.links.ground.points)[2]",
-    )
+    pivot = user.state("Object.keys(s.answer.value.entries.links.ground.points)[2]")
     user.of("actions", "m.edit(given)", [{"do": "load", "against": pivot, "size": "6 N m"}, rubbing])
     drawn, typed = effort(user.state("s.text.value")), effort(TYPED)
     np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
@@ -179,12 +177,9 @@ def test_a_mechanism_is_mirrored_by_its_menu(user, by):
         user.keys("Control+a", "Shift+F10")
         user.keys("ArrowDown", "Enter")
     else:
-        if by == "mouse":
-            user.page.mouse.click(*hand.at(corner), button="right")
-        else:
-            hand.fingers("touchStart", hand.at(corner))
-            user.until("document.querySelector('.context')")
-            hand.fingers("touchEnd")
+        hand.fingers("touchStart", hand.at(corner))
+        user.until("document.querySelector('.context')")
+        hand.fingers("touchEnd")
         user.page.click("role=menuitem[name='Choose all links']")
         assert user.page.locator(".of-group").count() == 3
         user.page.click("role=button[name='Mirror left to right']")

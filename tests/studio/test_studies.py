@@ -80,9 +80,8 @@ def test_a_study_is_stopped_and_tells_how_far_it_is(jobs) -> None:
 
 
 def test_what_is_wrong_with_a_model_is_its_output(jobs) -> None:
-    job = ended(
-        jobs, jobs.start({"text": "trunnion: 1\nlinks: {}\n", "verb": "play", "options": {}}, "model.yaml", None)
-    )
+    asked = {"text": "trunnion: 1\nlinks: {}\n", "verb": "play", "options": {}}
+    job = ended(jobs, jobs.start(asked, "model.yaml", None))
     assert job["status"] == 2
     assert "error" in job["output"]
     assert job["report"] is None

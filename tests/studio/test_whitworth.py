@@ -46,9 +46,6 @@ joint_defaults:
 """
 
 
-MODELS = {"ram": TEXT}
-
-
 FORCE = "-150 N * max(-1, min(1, G.slide_velocity / (1 mm/s)))"
 
 
@@ -75,19 +72,10 @@ def test_of_thinned_positions_it_is_that_of_those_shown_and_of_others_unknown():
     assert scene(result.isel(position=slice(0, 90)))["loads"][0]["course"] is None
 
 
-PIN = ["links", "link3", "points", "E"]
-
-
-def put(text, path, value):
-    return edited(text, {}, {"do": "set", "path": path, "value": value})[0]
-
-
-@pytest.mark.parametrize(
-    ("typed", "rod"),
-    [("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")],
-)
+@pytest.mark.parametrize(("typed", "rod"), [("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")])
 def test_a_definition_typed_for_a_number_makes_a_dimension(typed, rod):
-    text = put(TEXT, PIN, [typed, "0"])
+    pin = ["links", "link3", "points", "E"]
+    text, _ = edited(TEXT, {}, {"do": "set", "path": pin, "value": [typed, "0"]})
     entries = entries_of(text)[0]
     assert entries["dimensions"] == {"crank": "30 mm", "rod": rod}
     assert entries["links"]["link3"]["points"]["E"] == ["rod", 0]
@@ -96,6 +84,7 @@ def test_a_definition_typed_for_a_number_makes_a_dimension(typed, rod):
 
 @pytest.mark.parametrize("typed", ["crank", "2 * crank", "max(crank, 5 mm)", "drive", "off"])
 def test_words_that_mean_something_make_none(typed):
-    entries = entries_of(put(TEXT, ["joint_defaults", "friction"], typed))[0]
+    text, _ = edited(TEXT, {}, {"do": "set", "path": ["joint_defaults", "friction"], "value": typed})
+    entries = entries_of(text)[0]
     assert entries["dimensions"] == {"crank": "30 mm"}
     assert entries["joint_defaults"]["friction"] == typed

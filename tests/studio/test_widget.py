@@ -48,11 +48,7 @@ def test_the_kernel_answers_as_the_server_does(widget) -> None:
     assert found["revision"] == 3
     effort = trunnion.analyse(trunnion.read(FOURBAR), 60)["drive_effort"].values[0]
     np.testing.assert_allclose(found["scene"]["drivers"][0]["effort"], effort, rtol=1e-5)
-    for path, status in (
-        ("/files", 200),
-        ("/file/mechanism.yaml", 200),
-        ("/import/a.step", 404),
-    ):
+    for path, status in (("/files", 200), ("/file/mechanism.yaml", 200), ("/import/a.step", 404)):
         widget._asked(widget, {"id": "a 2", "path": path}, [])
         assert sent.pop()[0]["status"] == status, path
 
@@ -63,9 +59,8 @@ def test_it_follows_what_is_saved_and_asked_in_the_cell(widget) -> None:
     assert text != widget.text
     widget._asked(widget, {"id": "a 1", "path": "/file/mechanism.yaml"}, [json.dumps({"text": text}).encode()])
     assert widget.mechanism.parameters()["dimensions.AB"] == pytest.approx(2.1)
-    widget._asked(
-        widget, {"id": "a 1", "question": json.dumps({"ask": "model", "text": "links: {", "revision": 1})}, []
-    )
+    question = json.dumps({"ask": "model", "text": "links: {", "revision": 1})
+    widget._asked(widget, {"id": "a 1", "question": question}, [])
     with pytest.raises(trunnion.MechanismError):
         widget.mechanism  # noqa: B018
 

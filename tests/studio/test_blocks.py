@@ -9,7 +9,7 @@ import pytest
 import trunnion
 from studio.asking import EXAMPLES, analysed, ask, edited, model_of, near, sound, unpacked
 from trunnion.model.file import entries_of, text_of
-from trunnion.results.attributes import without_noise
+from trunnion.results.dataset import without_noise
 from trunnion.studio.answers import answer
 
 WATT = EXAMPLES["watt-six-bar"]
@@ -18,8 +18,7 @@ WATT = EXAMPLES["watt-six-bar"]
 @pytest.mark.parametrize("name", ["watt-six-bar", "drawing-press", "rssr", "cardan-gears"])
 def test_what_passes_the_wires_is_what_the_groups_give(name):
     """The load on the earlier link, with friction; and every joint is inside one block or the wire to one."""
-    found, result = sound("blocks", EXAMPLES[name]), analysed(EXAMPLES[name])
-    result = without_noise(result)
+    found, result = sound("blocks", EXAMPLES[name]), without_noise(analysed(EXAMPLES[name]))
     inner = [joint for block in found["blocks"] for joint in block.get("inner", [])]
     assert sorted(inner + [wire["joint"] for wire in found["wires"]]) == sorted(result["joint"].values)
     layout = json.loads(result.attrs["scene"])["joints"]

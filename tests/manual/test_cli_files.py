@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import typer
@@ -26,10 +27,7 @@ from trunnion.cycle import analyse as analysing
 def test_an_unforeseen_exception_is_one_line(
     program: Run, monkeypatch: pytest.MonkeyPatch, fault: BaseException
 ) -> None:
-    def broken(*_: object, **__: object) -> None:
-        raise fault
-
-    monkeypatch.setattr(analysing, "analysed", broken)
+    monkeypatch.setattr(analysing, "analysed", Mock(side_effect=fault))
     done = program("analyse", FOUR_BAR)
     assert done.code == 3
     assert done.out == ""
@@ -60,11 +58,6 @@ def test_debug_shows_where(
 PARTS = ["--steps", "100000"]  # so many positions are written some at a time
 
 
-def limited() -> None:
-    """No file grows beyond 5 kB."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
-
-
 @pytest.mark.spread(1, "r.xlsx")
 @pytest.mark.parametrize(
     ("out", "words"),
@@ -77,11 +70,12 @@ def limited() -> None:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_a_full_disk_is_a_finding(out: str, words: list[str], tmp_path: Path) -> None:
-    """A limit of the size of files stands for it: the process is not taken along, and nothing is left behind."""
+    """A limit of 5 kB a file stands for it: the process is not taken along, and nothing is left behind."""
     verb, *options = words
     done = subprocess.run(
         [sys.executable, "-m", "trunnion", verb, str(FOUR_BAR), *options, "--out", str(tmp_path / out)],
-        capture_output=True, text=True, check=False, preexec_fn=limited,
+        capture_output=True, text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000)),
     )  # fmt: skip
     assert done.returncode == 2, done.stderr
     assert "cannot be written" in done.stderr

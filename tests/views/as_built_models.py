@@ -31,15 +31,10 @@ assembly: {C: [0.09, 0.06]}
 """
 
 
-def four_bar_model(**errors: str) -> Mechanism:
-    """The four-bar with its pin B at ξ = 30°, and with errors of dimensions."""
-    stated = "".join(f"\n  {name}: {value}" for name, value in errors.items())
-    return Mechanism.model_validate(YAML(typ="safe").load(FOUR_BAR + (f"errors:{stated}\n" if stated else "")))
-
-
-def four_bar(steps: int = 72, **errors: str) -> Any:
-    """The same analysed."""
-    return trunnion.analyse(four_bar_model(**errors), steps)
+def four_bar(steps: int = 72, seat: str = ", seat: {xi: 30 deg}", **errors: str) -> Any:
+    """The four-bar with its pin B at ξ = 30°, and with errors of dimensions, analysed."""
+    data = YAML(typ="safe").load(FOUR_BAR.replace(", seat: {xi: 30 deg}", seat))
+    return trunnion.analyse(Mechanism.model_validate(data | ({"errors": errors} if errors else {})), steps)
 
 
 def loaded(example: str, steps: int = 72, **values: Any) -> Any:

@@ -16,11 +16,6 @@ def ideal():
     return four_bar(ideal=True)
 
 
-def _two_drivers():
-    """As a result of two drivers would look: the second drive is another column."""
-    return four_bar(90).isel(driver=[0, 0]).assign_coords(driver=["A", "D"])
-
-
 CASES = {
     "plain": four_bar,
     "gap": lambda: four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)),
@@ -30,7 +25,7 @@ CASES = {
     "two positions": lambda: four_bar(2),
     "sliding drive": slider,
     "odd names": lambda: four_bar(90, rename=NASTY),
-    "two drivers": _two_drivers,
+    "two drivers": lambda: four_bar(90).isel(driver=[0, 0]).assign_coords(driver=["A", "D"]),
 }
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from as_built_models import EXAMPLES
 
 import trunnion
+from mechanisms_parts import joined
 
 LIMIT = np.radians(0.1)
 ODD = ["Ω—Welle", "</script><script>alert(1)</script>", '<img src=x onerror="alert(2)">', "_$x$ & <!-- 曲柄"]
@@ -42,8 +43,7 @@ def structure():
     truss = trunnion.Mechanism(
         dimensions={"l1": "100 mm", "l3": "90 mm", "l4": "70 mm"},
         links={name: {"points": points} for name, points in links.items()},
-        joints={name: {"type": "revolute", "links": ends} for name, ends in
-                {"A": ["ground", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}.items()},
+        joints=joined("ground -A- coupler -C- rocker, ground -D- rocker"),
         assembly={"C": ["60 mm", "60 mm"]},
         measures={"theta": ANGLE},
         tolerances=dict.fromkeys(("l1", "l3", "l4"), "±0.07 mm"),

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import re
-import sys
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +13,6 @@ from test_report import Page
 import trunnion
 from drawn import labels, outside, texts
 from rig_measurements import measured, rocker
-from trunnion.cli.app import main
 from trunnion.results.tables.studies import COMPARISON as TABLES
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views import draw
@@ -45,11 +43,8 @@ def case(name):
     }  # fmt: skip
     if name == "locked":
         found = measured(settings=[{}, {}, {}], channels=POWERS).conditions
-        values = ({FRICTION: 0.1}, {FRICTION: 0.2}, {FRICTION: 40.0})
-        return trunnion.rig.compare(
-            rocker(),
-            Measurement("bench", tuple(replace(one, values=told) for one, told in zip(found, values, strict=True))),
-        )
+        rough = [replace(one, values={FRICTION: told}) for one, told in zip(found, (0.1, 0.2, 40.0), strict=True)]
+        return trunnion.rig.compare(rocker(), Measurement("bench", tuple(rough)))
     return trunnion.rig.compare(rocker(), of[name]())
 
 
@@ -97,15 +92,10 @@ def test_what_was_set_stands_beside_the_courses_of_its_condition():
     assert str(result["condition"].values[3]) in drawn.subfigs[0].get_suptitle()
 
 
-@cache
-def page_of(name):
-    return report(case(name))
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["wrong", "one turn", "one position", "motion only"])
 def test_every_result_makes_a_page_that_fetches_and_runs_nothing(name):
-    text = page_of(name)
+    text = report(case(name))
     page = Page(text)
     assert not page.open
     assert not re.search(r"https?://", text)
@@ -128,11 +118,3 @@ def test_names_are_text():
     text = report(trunnion.rig.compare(rocker(), replace(found, name="<b>曲柄</b>", conditions=odd)))
     assert "<script" not in text
     assert "<b>曲柄</b>" in " ".join(Page(text).words)
-
-
-def run(monkeypatch, capsys, *arguments):
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(sys, "argv", ["trunnion", *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
-    return end.value.code, *capsys.readouterr()

@@ -9,6 +9,7 @@ from stand_in import four_bar, slider
 
 import trunnion
 from drawn import line
+from mechanisms_parts import joined
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
 from trunnion.views.axis import abscissa
@@ -96,12 +97,8 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
     data = trunnion.read(EXAMPLES / "slider-crank.yaml").data()
-    data["measures"] = {
-        "stroke": {"slide": "S", "as": "peak-to-peak"},
-        "far": {"slide": "S", "as": "maximum"},
-        "near": {"slide": "S", "as": "minimum"},
-        "swing": {"angle": "rod"},
-    }
+    of = {"stroke": "peak-to-peak", "far": "maximum", "near": "minimum"}
+    data["measures"] = {name: {"slide": "S", "as": rule} for name, rule in of.items()} | {"swing": {"angle": "rod"}}
     result = trunnion.analyse(trunnion.Mechanism(**data), 36)
     slide, angle = figure_of(result, "measures").axes
     assert slide.get_ylabel() == "slide of S [mm]"
@@ -125,7 +122,7 @@ STEPS = 24
 HOIST = {
     "trunnion": 1,
     "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P": [0.02, 0]}}},
-    "joints": {"A": {"type": "revolute", "links": ["ground", "crank"], "pin": {"radius": 0.012}, "friction": 0.5}},
+    "joints": joined("ground -A- crank", A={"pin": {"radius": 0.012}, "friction": 0.5}),
     "drivers": {"A": {"speed": 1.0, "range": [0.0, 2.5]}},
     "loads": {"weight": {"link": "crank", "at": "P", "force": [0.0, -100.0], "useful": True}},
 }
@@ -134,11 +131,6 @@ HOIST = {
 @pytest.fixture(scope="module")
 def press():
     return trunnion.read(EXAMPLES / "drawing-press.yaml")
-
-
-@pytest.fixture(scope="module")
-def cycle(press):
-    return trunnion.analyse(press, STEPS)
 
 
 def test_margin_and_multiples_are_drawn_as_computed(press):
@@ -169,7 +161,8 @@ def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     assert len({patch.get_facecolor() for patch in upper.patches}) == 4
 
 
-def test_the_mechanism_is_drawn_at_a_place(cycle):
+def test_the_mechanism_is_drawn_at_a_place(press):
+    cycle = trunnion.analyse(press, STEPS)
     place = cycle["drive"].values[12]
     drawn = figure_of(cycle, "mechanism", at=float(place) / 1000)  # a plain number is SI
     assert f"{place:.4g} mm" in drawn.axes[0].get_title(loc="left")

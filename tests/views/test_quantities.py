@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from mechanisms_parts import joined
 from trunnion import Mechanism
 from trunnion.model.units import shown_as
 from trunnion.results.attributes import units_of
@@ -39,18 +40,11 @@ def test_a_page_has_one_unit_for_a_quantity():
     """That of its largest figure; what would need more than two zeros, or five digits before the point, has its own."""
     units = common([(4.2, "W"), (0.1136, "W"), (15e3, "N"), (math.nan, "N"), (0.5, "1"), (0.0, "N m")])
     assert units.keys() == {"W", "N"}
-    figures = [
-        (0.1136, "W"),
-        (0.004, "W"),
-        (2e4, "W"),
-        (950.0, "N"),
-        (-950.0, "N"),
-        (0.31, "N"),
-        (3.0, "N m"),
-        (0.5, "1"),
-    ]
-    texts = ["0.1136 W", "4.000 mW", "20.00 kW", "0.9500 kN", "−0.9500 kN", "310.0 mN", "3.000 N m", "0.5000"]
-    assert [quantity(value, unit, units).replace("\u00a0", " ") for value, unit in figures] == texts
+    texts = {
+        "0.1136 W": (0.1136, "W"), "4.000 mW": (0.004, "W"), "20.00 kW": (2e4, "W"), "0.9500 kN": (950.0, "N"),
+        "−0.9500 kN": (-950.0, "N"), "310.0 mN": (0.31, "N"), "3.000 N m": (3.0, "N m"), "0.5000": (0.5, "1"),
+    }  # fmt: skip
+    assert [quantity(*figure, units).replace("\u00a0", " ") for figure in texts.values()] == [*texts]
 
 
 @pytest.mark.parametrize(
@@ -79,20 +73,6 @@ def test_two_ends_are_told_apart_in_one_unit():
 FEET = {"m": "ft", "N": "lbf", "rad": "deg"}
 
 
-def in_feet() -> Mechanism:
-    """A crank with a mass that hangs, stated in feet and pounds."""
-    return Mechanism(
-        gravity=["0 ft/s^2", "-32.174 ft/s^2"],
-        links={
-            "ground": {"points": {"A": ["0 ft", "0 ft"]}},
-            "crank": {"points": {"A": ["0 ft", "0 ft"], "B": ["2 ft", "0 ft"]}, "mass": "10 lb", "centre": ["2 ft", 0]},
-        },
-        joints={"A": {"type": "revolute", "links": ["ground", "crank"], "pin": {"radius": "0.1 ft"}, "friction": 0.1}},
-        drivers={"A": {"speed": "60 rpm"}},
-        loads={"side": {"link": "crank", "at": "B", "force": ["5 lbf", "0 lbf"]}},
-    )
-
-
 def test_units_by_hand() -> None:
     """1 lbf = 4.4482216152605 N, 1 ft = 0.3048 m."""
     with shown_as(FEET):
@@ -116,7 +96,17 @@ def test_units_by_hand() -> None:
 
 
 def test_a_result_is_shown_as_its_model_is_stated() -> None:
-    found = trunnion.analyse(in_feet(), steps=8)
+    crank = Mechanism(
+        gravity=["0 ft/s^2", "-32.174 ft/s^2"],
+        links={
+            "ground": {"points": {"A": ["0 ft", "0 ft"]}},
+            "crank": {"points": {"A": ["0 ft", "0 ft"], "B": ["2 ft", "0 ft"]}, "mass": "10 lb", "centre": ["2 ft", 0]},
+        },
+        joints=joined("ground -A- crank", A={"pin": {"radius": "0.1 ft"}, "friction": 0.1}),
+        drivers={"A": {"speed": "60 rpm"}},
+        loads={"side": {"link": "crank", "at": "B", "force": ["5 lbf", "0 lbf"]}},
+    )
+    found = trunnion.analyse(crank, steps=8)
     assert {units_of(found)[si][1] for si in ("m", "N", "N m", "W")} == {"ft", "lbf", "lbf ft", "lbf ft/s"}
     page = trunnion.report(found)
     assert "lbf ft" in page

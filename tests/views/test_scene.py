@@ -12,6 +12,7 @@ from stand_in import four_bar
 from test_report import Page
 
 from mechanisms import MODELS, analyse, slider_crank
+from mechanisms_parts import joined
 from trunnion import Mechanism, read
 from trunnion import analyse as analysed
 from trunnion.errors import Status
@@ -70,7 +71,6 @@ def test_the_report_tells_the_published_figures(plain, ideal):
 
 def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():
     """A ram between two pins: its guide bears nothing, however the ram lies."""
-    pin = {"type": "revolute"}
     ram = Mechanism(
         trunnion=1,
         links={
@@ -79,12 +79,7 @@ def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():
             "barrel": {"points": {"H": [0, 0], "Z": {"at": [0, 0], "axis": [1, 0]}}},
             "rod": {"points": {"Z": {"at": [0, 0], "axis": [1, 0]}, "G": [0, 0]}},
         },
-        joints={
-            "D": {**pin, "links": ["ground", "lever"]},
-            "H": {**pin, "links": ["ground", "barrel"]},
-            "Z": {"type": "prismatic", "links": ["barrel", "rod"]},
-            "G": {**pin, "links": ["rod", "lever"]},
-        },
+        joints=joined("ground -D- lever, ground -H- barrel =Z= rod -G- lever"),
         drivers={"Z": {"range": [0.65, 0.75], "speed": 0.05}},
         loads={"work": {"joint": "D", "resisting_torque": 60.0}},
         assembly={"G": [0, 0.15]},

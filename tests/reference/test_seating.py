@@ -18,9 +18,8 @@ from reference.maximal_space import Array, Data, Drive, in_planes, pose_of
 from reference.seat_oracle import clearance, settle, travelling
 from trunnion.algebra.panels import ON_GRID
 from trunnion.errors import Status
-from trunnion.solve.end_loads import loads_of
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.seating import SETTLED, seating_of
+from trunnion.solve.seating import SETTLED, loads_of, seating_of
 
 LINKAGES = {"four-bar": four_bar, "slider-crank": slider_crank}
 START = 0.1  # rad: off the positions at which the ideal joints do not slip

@@ -23,10 +23,10 @@ from trunnion.model.joint_parts import clearance
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward, status_of
 from trunnion.solve.contacts import bearing_ends, bearing_middle, has_pressure, loads_on_ends
-from trunnion.solve.end_loads import loads_of
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import locking_margin
+from trunnion.solve.seating import loads_of
 from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.system import System, Values
 

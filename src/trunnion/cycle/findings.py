@@ -28,11 +28,10 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS
 from trunnion.results.quantities import between, readable
 from trunnion.solve import loads
-from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import margin_in
+from trunnion.solve.seating import NO_LOAD, UNSETTLED, EndLoads, Seating, seating_of
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
-from trunnion.solve.seating import UNSETTLED, Seating, seating_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:

@@ -20,12 +20,11 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
-from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.memory import CHUNK, blocks
 from trunnion.solve.run import Run
-from trunnion.solve.seating import SETTLED, UNSETTLED, Seating, seating_of
+from trunnion.solve.seating import NO_LOAD, SETTLED, UNSETTLED, EndLoads, Seating, seating_of
 from trunnion.solve.system import Dial, System
 
 __all__ = ["ALL", "Arrays", "Dtype", "Kept", "Positions", "check_steps", "positions", "stretch"]

@@ -130,10 +130,6 @@ class Backward:
         """Largest bound of the equations of a module, 0 where no friction changes what presses on a contact."""
         return functools.reduce(np.maximum, [settled.bound for settled in self.settled], 0.0)
 
-    def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
-        """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
-        return self.walk.in_hole(joint, self.reactions[joint])
-
     def add(self, link: str, load: Any) -> None:
         """Add a load to those of a link; the ground bears any."""
         if link != self.walk.system.mechanism.fixed_link:

@@ -1,10 +1,13 @@
 """Where the pins lie in their holes over the cycle: seats that are given, and those that the reactions press them into.
 
+The loads of pins in the middle of their holes, `EndLoads`, say beforehand where a seat has to jump, for it follows them
+but for the little that the seats themselves change: where the load of an end jumps across the hole, or falls to what
+the play itself changes of it. There the pin crosses its hole, and a massless link stands for it no longer.
+
 A seat and the reactions depend on each other: the seat moves the links by some ρ/l of their size, the reactions change
 by as much, and so does the seat. So both are iterated at any time by itself; the reactions are those of pins held in
-their seats. Between the places at which a load jumps, a joint turns round or a pin crosses its hole (`end_loads`) the
-offsets are smooth: they are courses, found once. How fast the seats travel, and with them the links, are derivatives of
-these.
+their seats. Between the places at which a load jumps, a joint turns round or a pin crosses its hole the offsets are
+smooth: they are courses, found once. How fast the seats travel, and with them the links, are derivatives of these.
 
 Held pins take what resists a joint in the sense in which it moves without play. Where the travel of the pins turns that
 sense round, for the little while before or after the joint does, no seat agrees with its own friction.
@@ -13,11 +16,13 @@ sense round, for the little while before or after the joint does, no seat agrees
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
@@ -25,18 +30,33 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, flat
-from trunnion.algebra.panels import FIT, ORDER, POINTS
+from trunnion.algebra.panels import FIT, ON_GRID, ORDER, POINTS
+from trunnion.errors import Status
 from trunnion.joints.clearance import pressed, turned_by_friction
-from trunnion.solve.backward import Backward, Sense
-from trunnion.solve.end_loads import NO_LOAD, EndLoads, end_loads, loads_of, reactions
+from trunnion.joints.pairs import PAIRS
+from trunnion.solve.backward import Backward, Sense, status_of
 from trunnion.solve.forward import Travel, posed
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.shifts import GivenSeat
 from trunnion.solve.switches import accuracy_of, breaks_between
+from trunnion.solve.system import rubbing
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["ROUNDS", "SETTLED", "UNSETTLED", "Halt", "Seated", "Seating", "seating_of"]
+__all__ = [
+    "NO_LOAD", "ROUNDS", "SETTLED", "UNSETTLED", "EndLoads", "Halt", "Seated", "Seating", "loads_of", "seating_of",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+NO_LOAD = 1e-9  # of the largest reaction: a load below it is rounding and presses nothing anywhere
+JUMP = 0.1  # of the largest load of an end: a jump that passes as near to zero crosses the hole
+CROSSING = 5.0  # times play over size, of the reactions: a load that is less changes by the seat nearly as it presses
+QUIET = 0.01  # of the largest reaction of the cycle: what counts as one where all are small
+WIDEST = 1 / 480  # of the cycle: to either side of a crossing
+NOTHING = 1e-7  # of the largest load of an end: zero
+STILL = 1e-9  # of the largest rate of a joint: below it, it stands
+EDGE = 1e-9  # of a panel: beyond its ends
 
 ROUNDS = 12  # most of the iteration
 EXACT = 1e-12  # change that one more round would make of a seat, of its clearance, at which it has settled
@@ -47,7 +67,269 @@ IDLE = 1e-3  # of the largest load of the cycle: positions with less are like th
 ASIDE, MOST = 0.5, 3.0  # cosine by which the travel of a pin may turn its load, and how many times it may change it
 ROUNDING = 1e-9  # of a load: one that points away from the wall, not along it but for rounding
 
-Array = NDArray[np.float64]
+
+# ---- loads of pins in the middle of their holes -------------------------------------------------------------------
+
+
+class End(NamedTuple):
+    """An end of a joint that its load seats: its number among those of its play, rows of its load, radius, m."""
+
+    seat: GivenSeat
+    number: int
+    rows: list[int]
+    radius: float
+
+    @property
+    def place(self) -> int:
+        """1, 2, 3 of what is along the axis; 0 of a play with one end."""
+        ends = self.seat.play.model.ends
+        return int(ends[self.number][0][0]) if len(ends) > 1 else 0
+
+
+class Crossing(NamedTuple):
+    """Where a pin crosses its hole: which end, when, from and to, s, its load there and its largest load, N.
+
+    level: the load at which the crossing begins, N; 0 of a jump. A jump takes no time, and a pin that lies at one of
+    two sides changes them in none.
+    """
+
+    end: End
+    time: float
+    low: float
+    high: float
+    least: float
+    peak: float
+    level: float
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the pin is on its way for a time."""
+        return self.high > self.low and len(self.end.rows) > 1
+
+
+@dataclass(frozen=True)
+class EndLoads:
+    """The loads of a run's ends with every pin in the middle of its hole, over the cycle.
+
+    courses: loads, N, in the frame of each hole; the size of all reactions, N; reaction of every joint, N; rates of the
+    joints whose sense of motion decides a load. ends: those that loads seat; total: row of the size; senses: rows of
+    the rates; vectors: of every joint, rows of what presses it: its reaction, in space the force on either end.
+    """
+
+    run: Run
+    courses: Courses
+    ends: list[End]
+    total: int
+    senses: dict[str, slice]
+    vectors: list[list[list[int]]]
+
+    @functools.cached_property
+    def largest(self) -> float:
+        """The largest size of all reactions in the cycle, N."""
+        return self.peak([self.total])
+
+    def peak(self, rows: list[int]) -> float:
+        """The largest size of a vector of rows."""
+        most = self.courses.extreme(lambda all_rows: norm(all_rows[rows], axis=0))
+        return 0.0 if most is None else abs(most.value)
+
+    @functools.cached_property
+    def pressed(self) -> list[tuple[End, float]]:
+        """The ends that anything presses, with their largest load, N."""
+        peaks = [(end, self.peak(end.rows)) for end in self.ends]
+        return [(end, peak) for end, peak in peaks if peak > NO_LOAD * self.largest]
+
+    @functools.cached_property
+    def crossings(self) -> list[Crossing]:
+        """Where pins cross their holes, in the order of time; those of each end that touch are one."""
+        crossings, joins = list[Crossing](), self.courses.edges[1:]
+        for end, peak in self.pressed:
+            ends = np.array([self.courses.ends(row) for row in end.rows])
+            before, after = ends[:, 0], np.roll(ends[:, 1], -1, axis=1)  # of the last panel that after a period
+            step = after - before
+            with np.errstate(all="ignore"):
+                share = np.clip(-np.sum(before * step, axis=0) / np.sum(step * step, axis=0), 0.0, 1.0)
+            least = norm(before + share * step, axis=0)
+            over = (np.sum(before * after, axis=0) < 0) & (least <= JUMP * peak)
+            over &= np.minimum(norm(before, axis=0), norm(after, axis=0)) > self._level(end, joins)
+            over[-1] &= self.run.cycle.periodic
+            for time, load in zip(joins[over].tolist(), least[over].tolist(), strict=True):
+                crossings.append(Crossing(end, time, time, time, load, peak, 0.0))
+            crossings += _merged(list(self._dips(end, peak)))
+        return sorted(crossings, key=lambda crossing: crossing.time)
+
+    @functools.cached_property
+    def idle(self) -> list[tuple[End, float, float]]:
+        """The times, s, from and to, in which nothing presses an end that is pressed elsewhere."""
+        times = []
+        for end, _ in self.pressed:
+            turns = np.flatnonzero(np.diff(self._empty(end), prepend=False, append=False))
+            times += [(end, low, high) for low, high in self.courses.edges[turns].reshape(-1, 2).tolist()]
+        return times
+
+    def _empty(self, end: End) -> NDArray[np.bool_]:
+        """The panels in which nothing presses an end."""
+        sizes = np.sum(np.abs(self.courses.coefficients[:, end.rows]), axis=-1)
+        return np.asarray(np.max(sizes, axis=-1) <= NO_LOAD * self.largest)
+
+    @functools.cached_property
+    def rates(self) -> Courses:
+        """The rates of all rows."""
+        return self.courses.derivative()
+
+    def sensed(self, time: Array) -> dict[str, Array]:
+        """The sense, −1 to 1, of the motion that decides a friction or a load, of every joint, (freedom, time).
+
+        Where a joint turns round that which it takes up.
+        """
+        courses = self.courses
+        after = courses.edges[courses.panel(time)] + courses.half[courses.panel(time)]
+        senses = [
+            np.where(np.abs(rows) > STILL * courses.sizes[:, None], np.sign(rows), 0.0)
+            for rows in (courses.at(time), courses.at(after))
+        ]
+        return {
+            joint: np.where(senses[0][rows] != 0, senses[0][rows], senses[1][rows])
+            for joint, rows in self.senses.items()
+        }
+
+    def across(self, end: End, time: Array, load: Sequence[Number], least: Array) -> tuple[tuple[Array, ...], Array]:
+        """The load that seats an end, N, and the least one that presses it to its wall.
+
+        That of pins in the middle while the pin crosses its hole: it lies as far off the middle as the load is of that
+        with which it leaves the wall.
+        """
+        parts = np.array([np.broadcast_to(primal(part), time.shape) for part in load], float)
+        floor = np.broadcast_to(least, time.shape).copy()
+        for cross in self.crossings:
+            lanes = (time > cross.low) & (time < cross.high)
+            if cross.end == end and np.any(lanes):
+                parts[:, lanes] = self.courses.at(time[lanes])[end.rows]
+                if cross.lasts:
+                    floor[lanes] = cross.level
+        return tuple(np.asarray(row) for row in parts), np.asarray(floor)
+
+    @functools.cached_property
+    def passages(self) -> list[Crossing]:
+        """The crossings that are not the begin or end of a time without a load."""
+        return [
+            cross for cross in self.crossings
+            if not any(end == cross.end and low <= cross.high and cross.low <= high for end, low, high in self.idle)
+        ]  # fmt: skip
+
+    @functools.cached_property
+    def gaps(self) -> Array:
+        """Times, s, from and to, in which a pin is on its way across its hole or floats in it; (2, gap)."""
+        times = [(cross.low, cross.high) for cross in self.crossings if cross.lasts]
+        return np.array([*times, *((low, high) for _, low, high in self.idle)], float).reshape(-1, 2).T
+
+    def _level(self, end: End, time: Array) -> Array:
+        """The load of an end, N, that the play itself changes nearly as much as it is."""
+        size, play = self.courses.at(time)[self.total], end.seat.play
+        length = single(play.length) if play.model.size else 0.0  # over which a moment is a pair of loads
+        share = CROSSING * end.radius / max(single(self.run.system.size(self.run.values)), length)
+        return np.asarray(share * np.maximum(np.nan_to_num(size), QUIET * self.largest))
+
+    def _dips(self, end: End, peak: float) -> Iterator[Crossing]:
+        """Where a load falls to zero within what the play changes of it, and rises again."""
+        courses = self.courses
+        shallow = np.min(norm(courses.coefficients[:, end.rows] @ ON_GRID, axis=1), axis=1) <= 2 * JUMP * peak
+        for k in np.flatnonzero(shallow & ~self._empty(end)):
+            spots, loads, rates = _least(courses.coefficients[k, end.rows])
+            times = courses.edges[k] + courses.half[k] * (spots + 1.0)
+            level = self._level(end, np.clip(times, courses.edges[k], courses.edges[k + 1] * (1 - 1e-15)))
+            for time, load, rate, most in zip(
+                times, norm(loads, axis=0), norm(rates, axis=0) / courses.half[k], level, strict=True
+            ):
+                if load < most and (len(loads) > 1 or load <= NOTHING * peak):
+                    reach = min(np.sqrt(most**2 - load**2) / max(rate, 1e-300), WIDEST * courses.span)
+                    low, high = np.clip([time - reach, time + reach], courses.edges[0], courses.edges[-1])
+                    yield Crossing(end, float(time), float(low), float(high), float(load), peak, float(most))
+
+
+def _merged(crossings: list[Crossing]) -> list[Crossing]:
+    """Those that touch as one, of the least load of them."""
+    merged: list[Crossing] = []
+    for crossing in sorted(crossings, key=lambda crossing: crossing.low):
+        if merged and crossing.low <= merged[-1].high:
+            last = merged.pop()
+            least = min(last, crossing, key=lambda crossing: crossing.least)
+            crossing = least._replace(low=last.low, high=max(last.high, crossing.high))
+        merged.append(crossing)
+    return merged
+
+
+def _least(coefficients: Array) -> tuple[Array, Array, Array]:
+    """Places of a panel at which a vector, (component, coefficient), is least, inside or at an end of the panel; the
+    vector there, and its derivative by the place."""
+    slope = functools.reduce(
+        chebyshev.chebadd, (chebyshev.chebmul(part, chebyshev.chebder(part)) for part in coefficients)
+    )
+    roots = chebyshev.chebroots(chebyshev.chebtrim(slope, 1e-14 * np.max(np.abs(slope))))
+    real = np.real(roots[(np.abs(np.imag(roots)) <= 1e-4) & (np.abs(np.real(roots)) <= 1.0 + EDGE)])
+    spots = np.unique(np.clip(np.concatenate([real, [-1.0, 1.0]]), -1.0, 1.0))
+    bends = chebyshev.chebval(spots, chebyshev.chebder(slope)) if len(slope) > 1 else np.zeros(len(spots))
+    spots = spots[(bends > 0) | (np.abs(spots) == 1.0)]
+    values, slopes = (chebyshev.chebval(spots, part) for part in (coefficients.T, chebyshev.chebder(coefficients.T)))
+    return spots, np.asarray(values), np.asarray(slopes)
+
+
+def loads_of(back: Backward, seat: GivenSeat) -> list[tuple[Number, ...]]:
+    """Load of the pin on each end of its hole, N, in the hole's frame."""
+    force, moment = back.walk.in_hole(seat.joint, back.reactions[seat.joint])
+    return seat.play.model.loads(force, moment, seat.play.length)
+
+
+def reactions(back: Backward, loads: Sequence[Number]) -> Number:
+    """Size of all reaction forces and loads of ends together, N."""
+    count = back.walk.system.mechanism.coordinates
+    forces = (part for reaction in back.reactions.values() for part in tuple(flat(tuple(reaction)))[:count])
+    return np.sqrt(functools.reduce(operator.add, (primal(part) ** 2 for part in (*loads, *forces)), 0.0))
+
+
+def end_loads(run: Run, method: FrictionMethod) -> EndLoads:
+    """The loads of the ends of all joints that their loads seat."""
+    seats, joints = sorted(run.seats, key=lambda seat: seat.given is not None), list[str]()
+    system, count = run.system, run.system.mechanism.coordinates
+    for joint in dict.fromkeys([*rubbing(system), *system.resisted]):  # each contact of them is that of one freedom
+        pair, summed = PAIRS[system.joints[joint][0]], system.summed(joint) and joint not in system.resisted
+        if pair.one_axis and (len(pair.freedoms) == 1 or summed):
+            joints.append(joint)
+    ends, first = [], 0
+    for seat in seats:
+        for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
+            ends.append(End(seat, number, list(range(first, first + len(end))), single(radius)))
+            first += len(end)
+    rates = first + 1 + count * len(system.joints)
+    senses, last = {}, rates
+    for joint in joints:
+        senses[joint] = slice(last, last := last + len(PAIRS[system.joints[joint][0]].freedoms))
+    vectors = [[[first + 1 + count * i + k for k in range(count)]] for i in range(len(system.joints))]
+    if system.mechanism.space == "spatial":
+        sides = [[(end.seat.play.model.ends[end.number][0][0], end) for end in ends if end.seat.joint == joint]
+                 for joint in system.joints]  # fmt: skip
+        both = ([[row for at, end in of for row in end.rows if at == side] for side in "12"] for of in sides)
+        vectors = [[rows for rows in pair if rows] for pair in both]  # of the force on either end, across the axis
+
+    def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+        back = run.solve(time, method=method)
+        numbers = [part for seat in seats for load in loads_of(back, seat) for part in load]
+        numbers += [reactions(back, numbers)]
+        numbers += [part for joint in system.joints for part in tuple(flat(tuple(back.reactions[joint])))[:count]]
+        numbers += [rate for joint in joints for rate in back.walk.signed_rates(joint)]
+        rows = np.array([np.broadcast_to(np.asarray(primal(number), float), time.shape) for number in numbers])
+        return rows, (status_of(back, time.shape) >= Status.NOT_CONVERGED).astype(np.intp)
+
+    def like(sizes: Array) -> Array:
+        return np.concatenate([np.full(rates, np.max(sizes[:rates])), sizes[rates:]])
+
+    courses = run.courses(look, None, Accuracy(shortest=1e-7), like)
+    return EndLoads(
+        run, courses, [end for end in ends if end.radius > 0 and end.seat.given is None], first, senses, vectors
+    )
+
+
+# ---- seats --------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -77,7 +359,6 @@ class Halt(NamedTuple):
     high: float
 
 
-@dataclass(frozen=True)
 class Seating:
     """The seats of a run over its cycle.
 
@@ -88,17 +369,43 @@ class Seating:
     state.
     """
 
-    run: Run
-    method: FrictionMethod
-    fixed: dict[str, float]
-    loads: EndLoads
-    courses: Courses
-    paths: Sequence[str]
-    links: Sequence[str]
-    halts: Sequence[Halt]
-    turned: Array
-    rounds: NDArray[np.intp]
-    change: Array
+    def __init__(self, run: Run, method: FrictionMethod) -> None:
+        self.run, self.method, self.loads = run, method, end_loads(run, method)
+        self.fixed: dict[str, float] = {}
+        for seat in run.seats:
+            if seat.given is not None:
+                offsets = seat.play.model.paths(f"seats.{seat.joint}", seat.given)
+                self.fixed |= {path: single(number) for path, number in offsets.items()}
+        self._seats = [seat for seat in run.seats if seat.given is None]
+        keys = ((seat.joint, key) for seat in self._seats for end in seat.play.model.ends for key in end)
+        self.paths = [f"seats.{joint}.{key}" for joint, key in keys]
+        self.change = np.zeros(4)
+        # low, high, s, polynomials and most rounds of the panels that settled
+        self._panels: list[tuple[float, float, Array, int]] = []
+        breaks = self.loads.courses.breaks
+        if run.cycle.duration > 0:
+            jumps = [cross.time for cross in self.loads.crossings if not cross.lasts]
+            breaks = breaks_between(run.cycle, np.concatenate([breaks, jumps, self.loads.gaps.ravel()]))
+
+        def like(sizes: Array) -> Array:
+            """The size of what is like each row: the offsets of the same end."""
+            radii = np.zeros(len(sizes))
+            for end in self.loads.ends:
+                radii[end.rows] = end.radius
+            return radii
+
+        if self.paths:
+            self.courses = Courses.of(self._settled, breaks, like, accuracy_of(run.cycle, RESOLVED))
+        else:
+            edges = breaks[[0, -1]]
+            self.courses = Courses(edges, np.zeros((1, 0, ORDER)), np.zeros(1, np.intp), edges, np.zeros(0), 0)
+        low, high = self.courses.edges[:-1], self.courses.edges[1:]
+        self.rounds = np.full(len(low), ROUNDS if self.paths else 0)  # all there are of panels that have not settled
+        for first, last, _, most in self._panels:  # the last is the narrowest
+            self.rounds[(first <= (high + low) / 2) & ((high + low) / 2 <= last)] = most
+        self.links, self.halts, self.turned = list[str](), list[Halt](), np.zeros((2, 0))
+        if self.loads.pressed and np.any(self.courses.states == SETTLED):
+            self._travel()
 
     @property
     def breaks(self) -> Array:
@@ -114,9 +421,9 @@ class Seating:
     def at(self, time: Array, method: FrictionMethod | None = None) -> Seated:
         """Motion and forces at times, s, with every pin in its seat; method: that of the seats if not given."""
         time = self._within(time)
-        rows, states, still = self._rows(time), self.states(time), self.run.system.algebra.STILL
+        rows, states, still = np.nan_to_num(self.courses.at(time)), self.states(time), self.run.system.algebra.STILL
         added = iter(np.where(states == SETTLED, rows[len(self.paths) :], 0.0))
-        travel = {link: _shaped(still, added) for link in self.links}
+        travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
         back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
         return Seated(back, states, self.sticks(time), self.rounds[self.courses.panel(time)])
 
@@ -127,10 +434,7 @@ class Seating:
 
     def offsets(self, time: Array) -> dict[str, Array]:
         """Where the pins lie at times, s, m, by the names of `shifts`."""
-        return self._placed(self._rows(self._within(time)))
-
-    def _rows(self, time: Array) -> Array:
-        return np.nan_to_num(self.courses.at(time))
+        return self._placed(np.nan_to_num(self.courses.at(self._within(time))))
 
     def _placed(self, rows: Array) -> dict[str, Array]:
         fixed = {path: np.full(rows.shape[1], number) for path, number in self.fixed.items()}
@@ -151,73 +455,46 @@ class Seating:
             return 0.0 * time
         return np.asarray(np.mod(time, duration) if self.run.cycle.periodic else np.clip(time, 0.0, duration))
 
-
-def seating_of(run: Run, method: FrictionMethod | None = None) -> Seating:
-    """The seats of a run, found once; what was asked of the margin of the method is left out."""
-    quick = replace(method or FrictionMethod(), margin_up_to=0.0)
-    return run.once(("seating", quick), lambda: _seating(run, quick))
-
-
-@np.errstate(all="ignore")
-def _seating(run: Run, method: FrictionMethod) -> Seating:
-    settling = _Settling(run, method)
-    if settling.paths:
-        courses = Courses.of(settling, settling.breaks(), settling.like, accuracy_of(run.cycle, RESOLVED))
-    else:
-        edges = settling.breaks()[[0, -1]]
-        courses = Courses(edges, np.zeros((1, 0, ORDER)), np.zeros(1, np.intp), edges, np.zeros(0), 0)
-    rounds, (courses, links, halts, turned) = settling.rounds(courses.edges), settling.travelling(courses)
-    return Seating(
-        run, method, settling.fixed, settling.loads, courses, settling.paths, links, halts, turned, rounds,
-        settling.change,
-    )  # fmt: skip
-
-
-class _Settling:
-    """The seats that loads press pins into, at any times: rows of offsets, m."""
-
-    def __init__(self, run: Run, method: FrictionMethod) -> None:
-        self.run, self.method, self.loads = run, method, end_loads(run, method)
-        self.fixed: dict[str, float] = {}
-        for seat in run.seats:
-            if seat.given is not None:
-                offsets = seat.play.model.paths(f"seats.{seat.joint}", seat.given)
-                self.fixed |= {path: single(number) for path, number in offsets.items()}
-        self.seats = [seat for seat in run.seats if seat.given is None]
-        self.paths = [f"seats.{seat.joint}.{key}" for seat in self.seats for end in seat.play.model.ends for key in end]
-        self.change = np.zeros(4)
-        # low, high, s, polynomials and most rounds of the panels that settled
-        self._panels: list[tuple[float, float, Array, int]] = []
-
-    def breaks(self) -> Array:
-        """Both ends of the cycle and what lies between them, s."""
-        edges = self.loads.courses.breaks
-        jumps = [cross.time for cross in self.loads.crossings if not cross.lasts]
-        times = np.concatenate([edges, jumps, self.loads.gaps.ravel()])
-        return breaks_between(self.run.cycle, times) if self.run.cycle.duration > 0 else edges
-
-    def like(self, sizes: Array) -> Array:
-        """The size of what is like each row: the offsets of the same end."""
-        radii = np.zeros(len(sizes))
-        for end in self.loads.ends:
-            radii[end.rows] = end.radius
-        return radii
-
     # ---- the iteration ----------------------------------------------------------------------------------------
 
-    def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
-        """Offsets, (row, time), and states at the nodes of panels, s."""
+    def _settled(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
+        """Offsets, (row, time), and states at the nodes of panels, s.
+
+        A round gains about as much as the one before it, so what one more would change is known from two. The steps are
+        extrapolated from the last two.
+        """
         first, last = time[::ORDER], time[ORDER - 1 :: ORDER]
         middle, half = (first + last) / 2, (last - first) / 2 / POINTS[-1]
         panels = list(zip(middle - half, middle + half, np.split(np.arange(len(time)), len(first)), strict=True))
-        start = np.zeros((len(self.paths), len(time)))
+        offsets = np.zeros((len(self.paths), len(time)))
         for low, high, nodes in panels:  # from the polynomials of the last wider panel that has settled
             slack = 1e-9 * (high - low)
             wider = [panel for panel in self._panels if panel[0] <= low + slack and high - slack <= panel[1]]
             if wider:
                 begin, end, polynomials, _ = wider[-1]
-                start[:, nodes] = chebyshev.chebval(2 * (time[nodes] - begin) / (end - begin) - 1, polynomials.T)
-        offsets, rounds, change, unknown = self._settled(time * (self.run.cycle.duration > 0), start)
+                offsets[:, nodes] = chebyshev.chebval(2 * (time[nodes] - begin) / (end - begin) - 1, polynomials.T)
+        moment, left, smooth = time * (self.run.cycle.duration > 0), np.arange(len(time)), offsets.copy()
+        rounds, change, unknown = np.zeros(len(time), np.intp), np.full(len(time), np.inf), np.zeros(len(time), bool)
+        before, moved_by = None, np.full(len(time), np.nan)
+        for k in range(1, ROUNDS + 1):
+            here = offsets[:, left]
+            goal = self._pressed(moment[left], here)
+            lost = ~np.all(np.isfinite(goal), axis=0)
+            goal[:, lost] = 0.0
+            # the largest way of a pin from seat to seat, of the radius of its end
+            ways = [norm((goal - here)[end.rows], axis=0) / end.radius for end in self.loads.ends]
+            now = np.where(lost, 0.0, np.max(ways, axis=0, initial=0.0))
+            rounds[left], unknown[left[lost]] = k, True
+            change[left] = now * np.fmin(now / moved_by, 1.0)
+            if k == 1:
+                smooth = goal.copy()  # of loads without play, or those of a wider panel
+            done = (change[left] <= EXACT) | lost
+            offsets[:, left] = goal if before is None or k == ROUNDS else self._extrapolated(*before, here, goal)
+            offsets[:, left[done]] = goal[:, done]
+            before, moved_by, left = (here[:, ~done], goal[:, ~done]), now[~done], left[~done]
+            if not len(left):
+                break
+        offsets[:, change > TOLERANCE] = smooth[:, change > TOLERANCE]
         states = np.where(change > TOLERANCE, UNSETTLED, SETTLED)
         for low, high in self.loads.gaps.T:
             states[(time > low) & (time < high)] = FLOATING
@@ -229,54 +506,15 @@ class _Settling:
         ]  # fmt: skip
         return offsets, states
 
-    def rounds(self, edges: Array) -> NDArray[np.intp]:
-        """The most rounds that a seat took between edges, s; of panels that have not settled all there are."""
-        rounds = np.full(len(edges) - 1, ROUNDS if self.paths else 0)
-        for low, high, _, most in self._panels:  # the last is the narrowest
-            rounds[(low <= (edges[1:] + edges[:-1]) / 2) & ((edges[1:] + edges[:-1]) / 2 <= high)] = most
-        return rounds
-
-    def _settled(self, time: Array, offsets: Array) -> tuple[Array, NDArray[np.intp], Array, NDArray[np.bool_]]:
-        """Offsets, rounds, change that one more would make, and where there are no loads; offsets: to begin with.
-
-        A round gains about as much as the one before it, so what one more would change is known from two. The steps are
-        extrapolated from the last two (Anderson's method with one step of memory, D. G. Anderson, J. ACM 12 (1965)
-        547-560, doi:10.1145/321296.321305).
-        """
-        rounds, change, unknown = np.zeros(len(time), np.intp), np.full(len(time), np.inf), np.zeros(len(time), bool)
-        left, last, smooth = np.arange(len(time)), np.full(len(time), np.nan), offsets.copy()
-        before: tuple[Array, Array] | None = None
-        for k in range(1, ROUNDS + 1):
-            here = offsets[:, left]
-            goal = self._pressed(time[left], here)
-            lost = ~np.all(np.isfinite(goal), axis=0)
-            goal[:, lost] = 0.0
-            now = np.where(lost, 0.0, self._apart(here, goal))
-            rounds[left], unknown[left[lost]] = k, True
-            change[left] = now * np.fmin(now / last, 1.0)
-            if k == 1:
-                smooth = goal.copy()  # of loads without play, or those of a wider panel
-            done = (change[left] <= EXACT) | lost
-            offsets[:, left] = goal if before is None or k == ROUNDS else self._extrapolated(*before, here, goal)
-            offsets[:, left[done]] = goal[:, done]
-            before, last, left = (here[:, ~done], goal[:, ~done]), now[~done], left[~done]
-            if not len(left):
-                break
-        offsets[:, change > TOLERANCE] = smooth[:, change > TOLERANCE]
-        return offsets, rounds, change, unknown
-
     def _static(self, time: Array, offsets: Array) -> Backward:
         """Motion and forces with the pins held at offsets, in the sense of the motion without play."""
         senses: dict[str, Sense] = {joint: tuple(rows) for joint, rows in self.loads.sensed(time).items()}
         return self.run.at(time, self._placed(offsets), self.method, senses, rests=dict.fromkeys(senses, False))
 
-    def _placed(self, offsets: Array) -> dict[str, Array | float]:
-        return {**self.fixed, **dict(zip(self.paths, offsets, strict=True))}
-
     def _pressed(self, time: Array, offsets: Array) -> Array:
         """Where the loads press the pins that are held at offsets, friction taken into account; NaN without loads."""
         back, senses = self._static(time, offsets), self.loads.sensed(time)
-        loads = {seat.joint: loads_of(back, seat) for seat in self.seats}
+        loads = {seat.joint: loads_of(back, seat) for seat in self._seats}
         size = reactions(back, [part for ends in loads.values() for load in ends for part in load])
         least = NO_LOAD * np.maximum(size, IDLE * self.loads.largest)
         seats = np.zeros_like(offsets) + 0.0 * size
@@ -289,14 +527,12 @@ class _Settling:
             seats[end.rows] = pressed(load, end.radius, floor)
         return np.asarray(seats)
 
-    def _apart(self, before: Array, after: Array) -> Array:
-        """The largest way of a pin from seat to seat, of the radius of its end."""
-        ways = [np.linalg.norm((after - before)[end.rows], axis=0) / end.radius for end in self.loads.ends]
-        return np.asarray(functools.reduce(np.maximum, ways, np.zeros(before.shape[1])))
-
     def _extrapolated(self, before: Array, after: Array, here: Array, goal: Array) -> Array:
         """The seats to which two rounds, before → after and here → goal, lead if the map between is a straight one; as
-        far from the middle as the last."""
+        far from the middle as the last.
+
+        Anderson's method with one step of memory, D. G. Anderson, J. ACM 12 (1965) 547-560, doi:10.1145/321296.321305.
+        """
         step, last = goal - here, after - before
         square = np.sum((step - last) ** 2, axis=0)
         share = np.sum(step * (step - last), axis=0) / np.where(square > 0, square, np.inf)
@@ -308,16 +544,14 @@ class _Settling:
 
     # ---- how the links move while the seats travel ------------------------------------------------------------
 
-    def travelling(self, courses: Courses) -> tuple[Courses, list[str], list[Halt], Array]:
-        """More rows: what the travel of the offsets adds to twist and acceleration of every link; these links, where
+    def _travel(self) -> None:
+        """Add to the courses what the travel of the offsets adds to twist and acceleration of every link; find where
         pins cannot travel so, and where the travel turns round the sense of a joint.
 
         The twist comes of the poses, which are fed the rates of the offsets as ε parts. What play adds to the twist,
         beside that of pins in the middle, is a course by itself, and its derivative what play adds to the acceleration.
         """
-        run, settled = self.run, courses.states == SETTLED
-        if not (self.loads.pressed and np.any(settled)):
-            return courses, [], [], np.zeros((2, 0))
+        run, courses, settled = self.run, self.courses, self.courses.states == SETTLED
         time, offsets = courses.nodes(settled), courses.on_nodes(settled)
         rates, back = courses.rates(offsets, settled), self._static(time, offsets)
         static, middle = back.walk.motions, run.walk(time).motions
@@ -334,40 +568,36 @@ class _Settling:
             rows = [_rows(part, time) for part in (twist, *static[link][1:], *middle[link][1:])]
             added = courses.rates(rows[1] + rows[0] - rows[3], settled) + rows[4] - rows[2]
             both = np.nan_to_num([rows[0], added])
-            travel[link] = _shaped(static[link][1:], iter(both.reshape(-1, len(time))))
+            numbers = iter(both.reshape(-1, len(time)))
+            travel[link] = Travel(*each(static[link][1:], functools.partial(lambda left, _: next(left), numbers)))
             more = np.concatenate([more, *both])
         moving = run.at(time, self._placed(offsets), self.method, travel=travel)
-        joints = dict.fromkeys(end.seat.joint for end, _ in self.loads.pressed)
-        halts = [
-            Halt(joint, *times.tolist())
-            for joint in joints for times in _below(courses, self._contact(joint, time, offsets, back, moving)).T
-        ]  # fmt: skip
-        turned = _below(courses, self._senses(time, moving))
-        return courses.extended(more, settled), list(travel), halts, turned
-
-    def _contact(self, joint: str, time: Array, offsets: Array, back: Backward, moving: Backward) -> list[Array]:
-        """Numbers below 0 where the load of an end of a joint points away from the wall that its pin lies at, or the
-        travel turns the load far aside, or outdoes it; back: with pins held."""
-        signs = []
-        for end, peak in self.loads.pressed:
-            if end.seat.joint == joint:
-                static, moved = (
-                    _rows(tuple(loads_of(walk, end.seat)[end.number]), time) / peak for walk in (back, moving)
-                )
-                sizes = np.linalg.norm(static, axis=0) * np.linalg.norm(moved, axis=0)
-                signs.append(np.sum(static * offsets[end.rows], axis=0) / end.radius)
-                signs.append(np.sum(static * moved, axis=0) - ASIDE * sizes)
-                signs.append(np.sum(static**2 - ((moved - static) / MOST) ** 2, axis=0))
-        return signs
-
-    def _senses(self, time: Array, moving: Backward) -> list[Array]:
-        """Numbers below 0 where joints do not move in the sense that is taken."""
-        signs = []
-        for joint, senses in self.loads.sensed(time).items():
-            for sense, number in zip(senses, moving.walk.signed_rates(joint), strict=True):
+        signs: dict[str, list[Array]] = {}
+        for end, peak in self.loads.pressed:  # below 0 where the load of an end points away from the wall that its pin
+            held, moved = (  # lies at, or the travel turns the load far aside, or outdoes it
+                _rows(tuple(loads_of(walk, end.seat)[end.number]), time) / peak for walk in (back, moving)
+            )
+            sizes = norm(held, axis=0) * norm(moved, axis=0)
+            signs.setdefault(end.seat.joint, []).extend([
+                np.sum(held * offsets[end.rows], axis=0) / end.radius,
+                np.sum(held * moved, axis=0) - ASIDE * sizes,
+                np.sum(held**2 - ((moved - held) / MOST) ** 2, axis=0),
+            ])  # fmt: skip
+        self.halts = [Halt(joint, *times) for joint, of in signs.items() for times in _below(courses, of).T.tolist()]
+        senses = []  # below 0 where joints do not move in the sense that is taken
+        for joint, taken_senses in self.loads.sensed(time).items():
+            for sense, number in zip(taken_senses, moving.walk.signed_rates(joint), strict=True):
                 rate = np.broadcast_to(number, time.shape) / max(float(np.nanmax(np.abs(number), initial=0.0)), 1e-300)
-                signs.append(np.where(sense != 0, rate * sense, -np.abs(rate)))
-        return signs
+                senses.append(np.where(sense != 0, rate * sense, -np.abs(rate)))
+        self.turned = _below(courses, senses)
+        self.courses, self.links = courses.extended(more, settled), list(travel)
+
+
+@np.errstate(all="ignore")
+def seating_of(run: Run, method: FrictionMethod | None = None) -> Seating:
+    """The seats of a run, found once; what was asked of the margin of the method is left out."""
+    quick = replace(method or FrictionMethod(), margin_up_to=0.0)
+    return run.once(("seating", quick), lambda: Seating(run, quick))
 
 
 def _below(courses: Courses, signs: Sequence[Array]) -> Array:
@@ -381,11 +611,6 @@ def _below(courses: Courses, signs: Sequence[Array]) -> Array:
 def _rows(numbers: Any, time: Array) -> Array:
     """The numbers of a tuple at every time, (row, time)."""
     return np.array([np.broadcast_to(primal(number), time.shape) for number in flat(numbers)], float)
-
-
-def _shaped(like: Any, rows: Iterator[Array]) -> Travel:
-    """Rows as the numbers of a twist and an acceleration."""
-    return Travel(*each(like, lambda _: next(rows)))
 
 
 def _share(back: Backward, joint: str) -> Number | None:

@@ -18,10 +18,9 @@ from trunnion.algebra.space import Screw
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
 from trunnion.measures.measures import MOTIONS, Measure, value
 from trunnion.solve import shifts
-from trunnion.solve.backward import Backward, pass_on, unloaded
+from trunnion.solve.backward import Backward, gears_of, pass_on, unloaded
 from trunnion.solve.forward import Forward, SpatialWalk, forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.gears import gears_of
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.system import System, Values

@@ -141,7 +141,7 @@ _GROUPS = (
     ),
     Fault(
         "thread-friction-across-the-screw-alone",
-        "solve/gears.py",
+        "solve/backward.py",
         "friction * lead / helix",
         "0.0 * friction",
         ("tests/reference/test_gears.py",),

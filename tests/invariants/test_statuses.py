@@ -134,7 +134,7 @@ def test_chunks_are_invisible(name: str, method: FrictionMethod | None, monkeypa
     """Solved 7 at a time or all together: every variable the same, condition included."""
 
     whole = analyse(MODELS[name](), 60, method)
-    monkeypatch.setattr(sys.modules["trunnion.solve.memory"], "CHUNK", 7)
+    monkeypatch.setattr(sys.modules["trunnion.solve.run"], "CHUNK", 7)
     parts = analyse(MODELS[name](), 60, method)
     for variable in whole.data_vars:
         a, b = np.asarray(parts[variable], float), np.asarray(whole[variable], float)

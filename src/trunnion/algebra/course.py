@@ -348,7 +348,11 @@ class _Resolving:
         self._done: list[_Panels] = []
 
     def courses(self) -> list[Courses]:
-        count, edges = len(self._breaks), [self._first_edges(lane_breaks) for lane_breaks in self._breaks]
+        count, edges = len(self._breaks), list[Array]()
+        for breaks in self._breaks:  # wide gaps are parted evenly
+            counts = np.ceil(np.diff(breaks) / (self._accuracy.widest * (breaks[-1] - breaks[0])) * (1 - 1e-9))
+            gaps = zip(breaks, breaks[1:], counts.astype(int), strict=False)
+            edges.append(np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in gaps]), breaks[-1]))
         left = _between(edges, np.arange(count))
         for _ in range(CHECKED):
             self._resolve(*left)
@@ -357,12 +361,6 @@ class _Resolving:
                 break
         panels = self._together()
         return [self._courses(k, panels.picked(panels.mechanism == k)) for k in range(count)]
-
-    def _first_edges(self, breaks: Array) -> Array:
-        """Breaks with wide gaps parted evenly."""
-        counts = np.ceil(np.diff(breaks) / (self._accuracy.widest * (breaks[-1] - breaks[0])) * (1 - 1e-9)).astype(int)
-        parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(breaks, breaks[1:], counts, strict=False)]
-        return np.append(np.concatenate(parts), breaks[-1])
 
     def _resolve(self, mechanism: Labels, low: Array, high: Array) -> None:
         """Part panels until each is resolved, or as narrow as a break is located."""
@@ -401,7 +399,9 @@ class _Resolving:
                 middle = _bending(time[even], values[even, worst[even]])
             edges = [*np.column_stack([low[even], middle, high[even]])]
             changing = left[mixed[left]]
-            edges += [np.concatenate([[low[k]], _changing(time[k], labels[k]), [high[k]]]) for k in changing]
+            for k in changing:  # the places on both sides of each change of the labels
+                after = np.flatnonzero(labels[k, 1:] != labels[k, :-1])
+                edges.append(np.array([low[k], *time[k, np.unique(np.concatenate([after, after + 1]))], high[k]]))
             left = np.concatenate([even, changing])
             mechanism, low, high = _between(edges, mechanism[left])
 
@@ -493,12 +493,6 @@ def _between(edges: Sequence[Array], mechanism: Labels) -> tuple[Labels, Array, 
         np.concatenate([edge[part] for edge in edges] or [np.zeros(0)]) for part in (slice(-1), slice(1, None))
     )
     return np.repeat(mechanism, [len(edge) - 1 for edge in edges]), low, high
-
-
-def _changing(time: Array, labels: Labels) -> Array:
-    """The times of a panel on both sides of each change of its labels."""
-    after = np.flatnonzero(labels[1:] != labels[:-1])
-    return np.asarray(time[np.unique(np.concatenate([after, after + 1]))])
 
 
 def _bending(time: Array, values: Array) -> Array:

@@ -108,7 +108,20 @@ def _solve_table(table: Table) -> tuple[list[list[Number]], Number]:
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):
-            product = product * _pivot_rows(table, k) * table[k, k]
+            sign: Number = 1.0
+            sizes = np.abs(table[k:, k])
+            largest = sizes[0]
+            for i in range(k + 1, n) if (sizes[1:] > largest).any() else ():  # the pivot, as in `_pivot`
+                swap = sizes[i - k] > largest
+                if not swap.any():
+                    continue
+                sign, largest = np.where(swap, -sign, sign), np.where(swap, sizes[i - k], largest)
+                upper, lower = table[k, k:], table[i, k:]
+                if swap.all():
+                    table[k, k:], table[i, k:] = lower.copy(), upper.copy()
+                else:
+                    table[k, k:], table[i, k:] = np.where(swap, lower, upper), np.where(swap, upper, lower)
+            product = product * sign * table[k, k]
             factor = table[k + 1 :, k] / table[k, k]
             table[k + 1 :, k + 1 :] -= factor[:, None] * table[k, k + 1 :]
         x = np.empty_like(table[:, n:])
@@ -118,26 +131,6 @@ def _solve_table(table: Table) -> tuple[list[list[Number]], Number]:
                 total = total - table[i, j] * x[j]
             x[i] = total / table[i, i]
     return [[x[i, side] for i in range(n)] for side in range(table.shape[1] - n)], product
-
-
-def _pivot_rows(table: Table, k: int) -> Number:
-    """`_pivot` of a table."""
-    sign: Number = 1.0
-    sizes = np.abs(table[k:, k])
-    largest = sizes[0]
-    if not (sizes[1:] > largest).any():
-        return sign
-    for i in range(k + 1, len(table)):
-        swap = sizes[i - k] > largest
-        if not swap.any():
-            continue
-        sign, largest = np.where(swap, -sign, sign), np.where(swap, sizes[i - k], largest)
-        upper, lower = table[k, k:], table[i, k:]
-        if swap.all():
-            table[k, k:], table[i, k:] = lower.copy(), upper.copy()
-        else:
-            table[k, k:], table[i, k:] = np.where(swap, lower, upper), np.where(swap, upper, lower)
-    return sign
 
 
 def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number:

@@ -113,7 +113,14 @@ def _slopes(knots: Sequence[Number], values: Sequence[Number], ends: Ends) -> li
     inner = [2 * (w[k - 1] + w[k]) for k in range(1, n - 1)]
     right = [r[k - 1] + r[k] for k in range(1, n - 1)]
     if ends == "periodic":
-        slopes = _cyclic(w, [2 * (w[-1] + w[0]), *inner], [r[-1] + r[0], *right])
+        # Sherman and Morrison: w[-1] joins the first and the last unknown; less u uᵀ / −main[0]
+        main, right, corner = [2 * (w[-1] + w[0]), *inner], [r[-1] + r[0], *right], w[-1]
+        reduced = [main[0] * 2, *main[1:-1], main[-1] + corner * corner / main[0]]
+        x = _tridiagonal(w, reduced, right)
+        z = _tridiagonal(w, reduced, [-main[0], *([0.0] * (len(main) - 2)), corner])
+        ratio = corner / main[0]
+        factor = (x[0] - ratio * x[-1]) / (1 + z[0] - ratio * z[-1])
+        slopes = [a - factor * b for a, b in zip(x, z, strict=True)]
         return [*slopes, slopes[0]]
     if ends == "clamped":
         return [0.0, *_tridiagonal(w[1:-1], inner, right), 0.0]
@@ -131,14 +138,3 @@ def _tridiagonal(side: Sequence[Number], main: Sequence[Number], right: Sequence
         above = side[k] * right[k + 1] if k + 1 < len(main) else 0.0
         right[k] = (right[k] - above) / main[k]
     return right
-
-
-def _cyclic(side: Sequence[Number], main: Sequence[Number], right: Sequence[Number]) -> list[Number]:
-    """The same with side[-1] joining the first and the last unknown (Sherman and Morrison)."""
-    corner = side[-1]
-    reduced = [main[0] * 2, *main[1:-1], main[-1] + corner * corner / main[0]]  # less u uᵀ / −main[0]
-    u = [-main[0], *([0.0] * (len(main) - 2)), corner]
-    x, z = _tridiagonal(side, reduced, right), _tridiagonal(side, reduced, u)
-    ratio = corner / main[0]
-    factor = (x[0] - ratio * x[-1]) / (1 + z[0] - ratio * z[-1])
-    return [a - factor * b for a, b in zip(x, z, strict=True)]

@@ -21,8 +21,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.variables import OF_SOME_JOINTS, VARIABLES
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.memory import CHUNK
-from trunnion.solve.run import Run
+from trunnion.solve.run import CHUNK, Run
 from trunnion.solve.switches import MARGINS, Mechanisms, accuracy_of, bends, breaks_between
 from trunnion.solve.system import Values
 from trunnion.solve.walk_kernel import Figure, Lanes, WalkKernel, lanes_of, literals, time_of

@@ -22,8 +22,7 @@ from trunnion.model.names import nearest
 from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.margin import least_beside, margin_in
-from trunnion.solve.memory import CHUNK, blocks
-from trunnion.solve.run import Run
+from trunnion.solve.run import CHUNK, Run, blocks
 from trunnion.solve.seating import NO_LOAD, SETTLED, UNSETTLED, EndLoads, Seating, seating_of
 from trunnion.solve.system import Dial, System
 

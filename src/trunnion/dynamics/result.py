@@ -39,8 +39,7 @@ from trunnion.results.dataset import Result, Variable, dataset_of, described
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_middle
 from trunnion.solve.forward import Forward, SpatialWalk
-from trunnion.solve.memory import CHUNK
-from trunnion.solve.run import Run
+from trunnion.solve.run import CHUNK, Run
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -139,22 +139,18 @@ class Graph:
         if None not in constants:
             with np.errstate(all="ignore"):
                 return self.constant(FOLDED[op](*constants))
-        simpler = self._of_one(op, args[0]) if len(args) == 1 else self._of_two(op, args, constants)
-        if simpler is not None:
-            return simpler
-        if op in RANGES and not self.within[args[0]]:  # within a loop it is NaN there
-            self.doubts.append(self.apply("not", self.apply("le", self.apply("abs", *args), self.constant(RANGES[op]))))
-        return self.node(op, tuple(sorted(args)) if op in COMMUTATIVE else args)
-
-    def _of_one(self, op: str, a: int) -> int | None:
-        inner = self.nodes[a]
+        inner = self.nodes[args[0]]
         if op in ("neg", "not") and inner.op == op:
             return inner.args[0]
         if op == "neg" and inner.op == "sub":
             return self.apply("sub", *inner.args[::-1])
         if op == "abs" and inner.op in ("neg", "abs"):
             return self.apply("abs", inner.args[0])
-        return None
+        if len(args) == 2 and (simpler := self._of_two(op, args, constants)) is not None:
+            return simpler
+        if op in RANGES and not self.within[args[0]]:  # within a loop it is NaN there
+            self.doubts.append(self.apply("not", self.apply("le", self.apply("abs", *args), self.constant(RANGES[op]))))
+        return self.node(op, tuple(sorted(args)) if op in COMMUTATIVE else args)
 
     def _of_two(self, op: str, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
         """What an operation on two nodes comes to where one is a constant or a negative, or both are the same."""

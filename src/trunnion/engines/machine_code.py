@@ -59,7 +59,9 @@ class MachineCode:
             code = _read(self.path)
             self.compiled = code is None
             if code is None:
-                code = _compiled(program.text)
+                module = llvm.parse_assembly(program.text)
+                module.verify()
+                code = bytes(_machine().emit_object(module))
                 _keep(self.path, code)
         self._link(program.inputs, program.rows, program.width, code)
 
@@ -87,7 +89,9 @@ class MachineCode:
     def _link(self, inputs: tuple[tuple[str, ...], ...], rows: int, width: int, code: bytes) -> None:
         self.inputs, self.rows, self.width = inputs, rows, width
         with COMPILING:
-            self._engine = _linked(code)
+            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            self._engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code))
+            self._engine.finalize_object()
         kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
         self.address = self._engine.get_function_address("kernel")
         self.function = ctypes.CFUNCTYPE(None, *kinds)(self.address)
@@ -108,14 +112,11 @@ class MachineCode:
             raise ValueError(f"{positions[1] - positions[0]} positions, where a vector holds {self.width}")
         stride = outputs[0].shape[-1]
         table = np.empty(max(1, self.rows * (positions[1] - positions[0])))
-        arrays = [[inputs[name] for name in names] for names in self.inputs]
-        arguments = (
-            *samples,
-            *positions,
-            stride,
-            *(_pointers(addresses) for addresses in (*arrays, outputs)),
-            table.ctypes.data,
-        )
+        tables = (*([inputs[name] for name in names] for names in self.inputs), outputs)
+        pointers = [
+            (ctypes.c_void_p * max(1, len(arrays)))(*(array.ctypes.data for array in arrays)) for arrays in tables
+        ]
+        arguments = (*samples, *positions, stride, *pointers, table.ctypes.data)
         alive = inputs, outputs, table  # as long as their addresses are in use
 
         def call() -> None:
@@ -125,10 +126,6 @@ class MachineCode:
         return call
 
 
-def _pointers(arrays: Sequence[NDArray[Any]]) -> Any:
-    return (ctypes.c_void_p * max(1, len(arrays)))(*(array.ctypes.data for array in arrays))
-
-
 def _machine() -> Any:
     name, features = _target()
     target = llvm.Target.from_default_triple()
@@ -136,20 +133,6 @@ def _machine() -> Any:
     model = "large" if platform.machine().lower() in ("x86_64", "amd64") else "jitdefault"
     # with more than the first level kernels take a tenth longer to compile and run as fast, within 4 %
     return target.create_target_machine(cpu=name, features=features, opt=1, reloc="pic", codemodel=model)
-
-
-def _compiled(text: str) -> bytes:
-    module = llvm.parse_assembly(text)
-    module.verify()
-    code: bytes = _machine().emit_object(module)
-    return code
-
-
-def _linked(code: bytes) -> Any:
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
-    engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return engine
 
 
 # ---- on disk --------------------------------------------------------------------------------------------------

@@ -180,7 +180,13 @@ class _Writer:
                     values[n] = self.lanes.compare("!=", entry, self.lanes.constant(0.0)) if bit else entry
                 self._emit(each, values, self.lanes)
                 for k, n in enumerate(self.outputs):
-                    self._output(self.out[k], place, self._of(n, values, self.lanes))
+                    number = self._of(n, values, self.lanes)
+                    if number.type == self.lanes.double:
+                        self._store(self.out[k], place, number)
+                        continue
+                    byte = self.b.zext(number, self.lanes.byte) if number.type == self.lanes.bit else number
+                    at = self.b.gep(self.b.bitcast(self.out[k], BYTE.as_pointer()), [place])
+                    self.b.store(byte, self.b.bitcast(at, byte.type.as_pointer()), align=1)
 
             self._positions(position)
 
@@ -204,15 +210,6 @@ class _Writer:
 
     def _store(self, pointer: Value, place: Value, value: Value) -> None:
         self.b.store(value, self.b.bitcast(self.b.gep(pointer, [place]), value.type.as_pointer()), align=8)
-
-    def _output(self, pointer: Value, place: Value, value: Value) -> None:
-        """A row of floats, or of bytes for what is true or false."""
-        if value.type == self.lanes.double:
-            self._store(pointer, place, value)
-            return
-        wide = self.b.zext(value, self.lanes.byte) if value.type == self.lanes.bit else value
-        at = self.b.gep(self.b.bitcast(pointer, BYTE.as_pointer()), [place])
-        self.b.store(wide, self.b.bitcast(at, wide.type.as_pointer()), align=1)
 
     # ---- nodes -------------------------------------------------------------------------------------------------------
 

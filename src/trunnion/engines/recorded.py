@@ -220,14 +220,6 @@ def _where(condition: Any, a: Any, b: Any) -> Any:
     return Recorded(graph, graph.where(*(number_of(graph, number) for number in (condition, a, b))))
 
 
-def _fmax(a: Any, b: Any) -> Any:
-    return _where(functions.isnan(a), b, _where(functions.isnan(b), a, functions.maximum(a, b)))
-
-
-def _fmin(a: Any, b: Any) -> Any:
-    return _where(functions.isnan(a), b, _where(functions.isnan(b), a, functions.minimum(a, b)))
-
-
 def _power(x: Any, power: Any) -> Any:
     if isinstance(power, Recorded) or power not in (0.5, 1, 2, 3, 4, 5, 6, -1, -2):
         raise UntraceableError(f"the power {power}")
@@ -267,7 +259,9 @@ NAMES: dict[str, Callable[..., Any]] = {
         "equal": "eq", "not_equal": "ne", "logical_and": "and", "logical_or": "or", "logical_xor": "xor",
         "bitwise_and": "and", "bitwise_or": "or",
     }.items()},
-    "where": _where, "fmax": _fmax, "fmin": _fmin, "power": _power, "searchsorted": _searchsorted, "take": _take,
+    "where": _where, "power": _power, "searchsorted": _searchsorted, "take": _take,
+    "fmax": lambda a, b: _where(functions.isnan(a), b, _where(functions.isnan(b), a, functions.maximum(a, b))),
+    "fmin": lambda a, b: _where(functions.isnan(a), b, _where(functions.isnan(b), a, functions.minimum(a, b))),
     "square": lambda x: x * x,
     "reciprocal": lambda x: 1.0 / x,
     "hypot": lambda a, b: functions.sqrt(a * a + b * b),

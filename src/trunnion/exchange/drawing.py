@@ -24,9 +24,8 @@ from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
 from trunnion.exchange.draft import Array, Draft, Pair
 from trunnion.exchange.skeleton import Positions, positions_of
-from trunnion.solve.backward import Backward
+from trunnion.solve.backward import Backward, gear_load
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.gears import gear_load
 from trunnion.solve.loads import springs, stated_loads
 from trunnion.solve.run import prepare
 from trunnion.solve.seating import seating_of

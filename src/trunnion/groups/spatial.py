@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,10 +151,6 @@ class SpatialGroup(Tree):
             for (link, a, b), torque in zip(self.spinning, multipliers, strict=True)
         ]
 
-    def spin_torques(self, pose: Pose, loads: Sequence[Screw]) -> list[Number]:
-        """Torque about its line that each link with a free spin would need to keep from spinning, N m."""
-        return self.multipliers(pose, loads)[6 * len(self.chords) :]
-
     def from_line(
         self, placed: Mapping[int, Element] | Sequence[Element], a: int, b: int, place: Vector3
     ) -> tuple[Number, Number]:
@@ -222,34 +218,19 @@ def unspun(group: SpatialGroup, elements: Sequence[Element], rows: Array, drive:
                 where = [place[begin + i] for i in range(4)]
                 rows[where] = _turned(rows[where], local, sense * spun)
             elif group.joints[k].kind == "planar":
-                ends = [
-                    _Plate(_full(end.x, grid), _full(end.y, grid), _full(end.place, grid)) for end in (first, second)
-                ]
+                ends = [[_full(part, grid) for part in (end.x, end.y, end.place)] for end in (first, second)]
                 turns = int(group.joints[k].sides[1] in members)
-                ends[turns] = _Plate(
-                    _about(ends[turns].x, axis, -spun), _about(ends[turns].y, axis, -spun),
-                    centre + _about(ends[turns].place - centre, axis, -spun),
-                )  # fmt: skip
-                rows[[place[begin + i] for i in range(3)]] = _planar(*ends)
+                x, y, at = ends[turns]
+                at = centre + _about(at - centre, axis, -spun)
+                ends[turns] = [_about(x, axis, -spun), _about(y, axis, -spun), at]
+                # both slides and the turn of a planar joint
+                (x, y, at), (along, _, second_at) = ends
+                slides = [np.sum((second_at - at) * direction, axis=0) for direction in (x, y)]
+                turn = np.arctan2(np.sum(along * y, axis=0), np.sum(along * x, axis=0))
+                rows[[place[begin + i] for i in range(3)]] = [*slides, np.unwrap(turn)]
             elif begin in place:
                 rows[place[begin]] += sense * spun
     return rows
-
-
-class _Plate(NamedTuple):
-    """Axes in the plane and place of an element of a planar joint, each (3, grid)."""
-
-    x: Array
-    y: Array
-    place: Array
-
-
-def _planar(first: _Plate, second: _Plate) -> Array:
-    """Both slides and the turn of a planar joint, (3, grid)."""
-    apart = second.place - first.place
-    slides = [np.sum(apart * axis, axis=0) for axis in (first.x, first.y)]
-    turn = np.arctan2(np.sum(second.x * first.y, axis=0), np.sum(second.x * first.x, axis=0))
-    return np.array([*slides, np.unwrap(turn)])
 
 
 def _about(vector: Array, axis: Array, angle: Array) -> Array:

@@ -17,8 +17,7 @@ from trunnion.measures.measures import Measure
 from trunnion.solve.backward import Backward, pose_status, status_of
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.memory import CHUNK
-from trunnion.solve.run import Run
+from trunnion.solve.run import CHUNK, Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.system import Values
 

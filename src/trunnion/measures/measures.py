@@ -38,7 +38,7 @@ from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work, 
 from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import System, Values
-from trunnion.solve.turns import near, turned
+from trunnion.solve.switches import near, turned
 
 __all__ = [
     "CURVES", "MOTIONS", "Formula", "Measure", "angle_at", "angles", "chosen", "coordinate_unit", "named", "near",

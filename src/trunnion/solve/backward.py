@@ -1,13 +1,13 @@
-"""Forces, backward through the row of modules: reactions, friction, drive efforts, and the power balance."""
+"""Forces, backward through the row of modules: reactions, friction, drive efforts, gear pairs, the power balance."""
 
 from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,16 @@ from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, cut, namespace
 from trunnion.algebra.nested import flat
+from trunnion.algebra.plane import ZERO_LOAD, Wrench, added
 from trunnion.errors import Status
-from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh, thread_forces
+from trunnion.groups.general import General
+from trunnion.joints.contact_loads import GuideLoad
 from trunnion.joints.friction import directed
 from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Rubbing, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.gears import GearLoad, acting, gear_load, on_thread, power_of, teeth, units
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, law_parameters, rubbing, sticking
 
@@ -31,8 +33,8 @@ if TYPE_CHECKING:
     from trunnion.solve.row_code import RowCode
 
 __all__ = [
-    "NEAR_SINGULAR", "Backward", "Given", "Sense", "backward", "by_numpy", "pass_on", "pose_status",
-    "pose_status_number", "row_code", "sense_of", "solve", "status_number", "status_of", "unloaded",
+    "NEAR_SINGULAR", "Backward", "Given", "Sense", "backward", "by_numpy", "gear_load", "gears_of", "pass_on",
+    "pose_status", "pose_status_number", "row_code", "sense_of", "solve", "status_number", "status_of", "unloaded",
 ]  # fmt: skip
 
 MANY_MODULES = 12  # of a row that is solved by machine code: of fewer, loading LLVM takes longer
@@ -68,6 +70,16 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
     """The share to take for one contact of a joint, with its sign."""
     sense = zero_slip.get(joint, 0.0)
     return sense[contact] if isinstance(sense, tuple) else sense
+
+
+class GearLoad(NamedTuple):
+    """What a gear pair does: torque in its second joint, on the second link, N m; tooth force on the second gear, N.
+
+    Of a rack or screw the torque is in the joint that turns, the force on the link that slides.
+    """
+
+    torque: Number
+    force: tuple[Number, Number]
 
 
 @dataclass
@@ -225,7 +237,19 @@ def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backwa
         still += [walk.still(joint, turns) for turns in system.resisted.get(joint, ())]
         back.resting[joint] = functools.reduce(operator.or_, still) if still else False
         cut(walk.time)
-    _add_body_loads(back)
+    gravity = system.vector(walk.values, "gravity")
+    for link in system.mechanism.effective_links:  # d'Alembert: −m a at the mass centre, the moment of its spin [D 2-5]
+        if link == system.mechanism.fixed_link:
+            continue
+        mass, moment = walk.values[f"links.{link}.mass"], walk.inertia_moment(link)
+        if moment is None and literal.is_zero(mass):
+            continue
+        centre = walk.at(link, system.centre(walk.values, link))
+        force = tuple(literal.times(mass, g - a) for g, a in zip(gravity, centre.acceleration, strict=True))
+        load = walk.algebra.about(force, walk.algebra.NO_MOMENT if moment is None else moment, centre.place)
+        back.body_power = back.body_power + walk.algebra.power(load, walk.motions[link].twist)
+        back.add(link, load)
+        cut(walk.time)
     senses = {joint: sense_of(conditions.zero_slip, joint) for joint in conditions.zero_slip}
     for name, action in stated_loads(walk, senses, conditions.rests):
         back.load_powers[name] = action.power
@@ -248,27 +272,6 @@ def by_numpy(walk: Forward, method: FrictionMethod, conditions: Given) -> Backwa
 
 def unloaded(walk: Forward) -> dict[str, Any]:
     return dict.fromkeys(walk.system.mechanism.effective_links, walk.algebra.ZERO_LOAD)
-
-
-# ---- loads ----------------------------------------------------------------------------------------------------
-
-
-def _add_body_loads(back: Backward) -> None:
-    """Gravity and inertia of every link: d'Alembert, −m a at the mass centre and the moment of its spin.  [D 2-5]"""
-    walk, system, algebra = back.walk, back.walk.system, back.walk.algebra
-    gravity = system.vector(walk.values, "gravity")
-    for link in system.mechanism.effective_links:
-        if link == system.mechanism.fixed_link:
-            continue
-        mass, moment = walk.values[f"links.{link}.mass"], walk.inertia_moment(link)
-        if moment is None and literal.is_zero(mass):
-            continue
-        centre, twist = walk.at(link, system.centre(walk.values, link)), walk.motions[link].twist
-        force = tuple(literal.times(mass, g - a) for g, a in zip(gravity, centre.acceleration, strict=True))
-        load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
-        back.body_power = back.body_power + algebra.power(load, twist)
-        back.add(link, load)
-        cut(walk.time)
 
 
 # ---- one module -----------------------------------------------------------------------------------------------
@@ -302,7 +305,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, conditio
     back.settled.append(settled)
     back.rubbed.append(rubbed)
     if module.spinning:
-        torques = cast(SpatialGroup, group).spin_torques(pose, loads)
+        torques = group.multipliers(pose, loads)[-len(module.spinning) :]  # that would keep links from spinning, N m
         back.spins.update((link, torque) for (link, _, _), torque in zip(module.spinning, torques, strict=True))
     pass_on(back, number, settled.reactions, rubbed, settled.forces)
 
@@ -333,11 +336,12 @@ def pass_on(
             back.gears[name], done = gear_load(walk, number, i, effort, force)
         else:
             done = acting(walk, number, i, effort, force, parting=False)
-        if back.travels:
-            back.gear_power = back.gear_power + power_of(walk, number, done)
         for joint, side, wrench in done:
+            link = places[joint].links[side]
+            if back.travels:  # on the way of the centres of the wheels
+                back.gear_power = back.gear_power + walk.algebra.power(wrench, walk.motions[link].twist)
             if places[joint].outer[side]:
-                back.add(places[joint].links[side], wrench)
+                back.add(link, wrench)
     for k, place in enumerate(places):
         if not place.witness:
             back.module_reactions[place.joint] = reactions[k]
@@ -408,6 +412,96 @@ def _record(
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, total if link == second else algebra.times(-1.0, total))
+
+
+# ---- gear pairs of a module ------------------------------------------------------------------------------------
+
+
+def gears_of(group: object) -> tuple[GearPair, ...]:
+    """The gear pairs of a module."""
+    return group.gears if isinstance(group, General) else ()
+
+
+def _mesh(walk: Forward, number: int, i: int) -> tuple[GearPair, Mesh]:
+    """A gear pair of a module and where its gears touch."""
+    pose, gear = walk.poses[number], gears_of(walk.system.groups[number])[i]
+    return gear, mesh(gear, pose.elements, pose.ratios[i])
+
+
+def teeth(walk: Forward, number: int) -> Iterator[Contact]:
+    """The forces with which inclined flanks push the gears of a module apart: tan α times the tooth force."""
+    module, places = walk.system.plan.modules[number], walk.system.places[number]
+    for i, name in enumerate(module.gears):
+        if not gears_of(walk.system.groups[number])[i].carriers:
+            continue
+        gear, touch = _mesh(walk, number, i)
+        unit_loads = units(walk, number, apart(gear, touch, 1.0))
+        angle = walk.values.get(f"gears.{name}.pressure_angle")
+        if angle is None:  # a chain or rope
+            continue
+        # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
+        load = GuideLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
+        slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
+        yield Contact(len(places) + i, unit_loads, load, slope, rubs=False)
+
+
+def units(walk: Forward, number: int, forces: Sequence[ToothForce]) -> list[Wrench]:
+    """What forces do to each link of a module."""
+    loads = dict.fromkeys(walk.system.plan.modules[number].links, ZERO_LOAD)
+    for joint, side, wrench in forces:
+        link = walk.system.places[number][joint].links[side]
+        if link in loads:
+            loads[link] = added(loads[link], wrench)
+    return list(loads.values())
+
+
+def on_thread(walk: Forward, number: int, i: int, friction: Number) -> list[ToothForce]:
+    """What friction along the thread of a screw, N, does to the links."""
+    gear, name = gears_of(walk.system.groups[number])[i], walk.system.plan.modules[number].gears[i]
+    lead = walk.system.ratio(walk.values, name)
+    lever = walk.values[f"joints.{walk.system.mechanism.coupled(name)[0]}.pin.radius"]
+    helix = namespace(lead, lever).sqrt(lever * lever + lead * lead)
+    torque, force = friction * lever * lever / helix, friction * lead / helix
+    return thread_forces(gear, walk.poses[number].elements, torque, force)
+
+
+def acting(
+    walk: Forward, number: int, i: int, effort: Number, along: Number = 0.0, parting: bool = True
+) -> list[ToothForce]:
+    """What a gear pair of a module does with an effort in its second joint, and with friction along its thread, N.
+
+    parting: by tooth forces, not efforts alone. Efforts alone are what moves with the play of joints: the ratio holds
+    between coordinates, which no offset of a pin changes.
+    """
+    pose, gear = walk.poses[number], gears_of(walk.system.groups[number])[i]
+    done = actions(gear if parting else gear._replace(carriers=None), pose.elements, pose.ratios[i], effort)
+    if gear.slide is not None and not gear.carriers and not literal.is_zero(along):
+        done += on_thread(walk, number, i, along)
+    return done
+
+
+def gear_load(walk: Forward, number: int, i: int, effort: Number, along: Number) -> tuple[GearLoad, list[ToothForce]]:
+    """What a gear pair does in the file's sense, and to which links.
+
+    along: the force that parts its gears, or friction along its thread, N.
+    """
+    done, gear = acting(walk, number, i, effort, along), gears_of(walk.system.groups[number])[i]
+    turned_round = walk.system.plan.modules[number].gears[i] in walk.system.turned_round
+    force: tuple[Number, Number] = (0.0, 0.0)
+    if gear.carriers:
+        pushes = apart(*_mesh(walk, number, i), along)
+        force = done[0].wrench.x + pushes[0].wrench.x, done[0].wrench.y + pushes[0].wrench.y
+        done += pushes
+        if turned_round:  # on the gear that the file names first
+            force = -force[0], -force[1]
+    elif gear.slide is not None:
+        total = dict.fromkeys((joint for joint, _ in gear.joints), ZERO_LOAD)  # on the second link of each joint
+        for joint, side, wrench in done:
+            total[joint] = added(total[joint], wrench) if side == 1 else total[joint]
+        x, y, _ = total[gear.joints[gear.slide][0]]
+        return GearLoad(total[gear.joints[1 - gear.slide][0]].m, (x, y)), done
+    in_first = turned_round if gear.slide is None else gear.slide == 1
+    return GearLoad(-effort * walk.poses[number].ratios[i] if in_first else effort, force), done
 
 
 # ---- what a position is worth ----------------------------------------------------------------------------------

@@ -22,7 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra import literal
 from trunnion.algebra.dual import primal, single
+from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.joints.friction import FrictionLaw
 from trunnion.solve.forward import Assembly, forward
@@ -58,18 +60,6 @@ class _Slip(NamedTuple):
         u = 1 - s
         return u * u * ((1 + 2 * s) * self.v0 + s * self.a0) + s * s * ((3 - 2 * s) * self.v1 - u * self.a1)
 
-    def reversal(self) -> Number:
-        """Share at which the speed changes sign; 0 where it does not.
-
-        Exact to rounding, for the step beside it then has no way to lose: so nothing depends on where it is cut.
-        """
-        real = _Slip(*(primal(number) for number in self))
-        v0, v1 = np.broadcast_arrays(real.v0, real.v1)
-        changes = v0 * v1 < 0
-        s = root(real.speed, np.zeros(v0.shape), np.ones(v0.shape), v0, v1, np.where(changes, NEAR, np.inf))
-        step = self.speed(s) / np.where(changes, real.slope(s), 1.0)  # 0 but for its dual part
-        return namespace(step).where(changes, s - step, 0.0)
-
     def slope(self, s: Number) -> Number:
         """Derivative of the cubic by the share."""
         u = 1 - s
@@ -99,6 +89,7 @@ class History:
         return keep * _picked(self.deflections, index) + gain
 
 
+@np.errstate(all="ignore")
 def histories(
     system: System, values: Values, assembly: Assembly, cycle: Cycle, reverse: bool = False
 ) -> dict[str, History]:
@@ -117,7 +108,15 @@ def histories(
     histories_of = {}
     for joint in joints:
         per_way = functools.partial(_per_way, law_of(system, joint), values, f"joints.{joint}.friction")
-        speed, rate = (number + np.zeros(count + 1) for number in walk.slip_motion(joint))  # lanes along the last axis
+        which, lever = 0 if system.turns(joint) else 1, 1.0
+        if system.turns(joint):  # the contact slips along its thread if it has one
+            lever, lead = values[f"joints.{joint}.pin.radius"], system.lead(values, joint)
+            if joint in system.screws:
+                lead = system.ratio(values, system.screws[joint][0])
+            if not is_zero(lead):
+                lever = namespace(lever, lead).sqrt(lever * lever + lead * lead)
+        motions = (walk.rates(joint)[which], walk.second_rates(joint)[which])
+        speed, rate = (literal.times(lever, number) + np.zeros(count + 1) for number in motions)
         if reverse:
             speed, rate = -_picked(speed, ends[::-1]), _picked(rate, ends[::-1])
         keep, gain = _mapped(per_way, _Slip.between(speed, rate, ends[:-1], length), np.ones(count))
@@ -128,7 +127,13 @@ def histories(
 
 def _mapped(per_way: PerWay, slip: _Slip, until: Number) -> tuple[Number, Number]:
     """A and B of z ↦ A z + B from the start of intervals to the share `until` of them."""
-    cut = slip.reversal()
+    real = _Slip(*(primal(number) for number in slip))
+    v0, v1 = np.broadcast_arrays(real.v0, real.v1)
+    changes = v0 * v1 < 0
+    # where the speed changes sign: exact to rounding, so that the step beside it has no way to lose
+    s = root(real.speed, np.zeros(v0.shape), np.ones(v0.shape), v0, v1, np.where(changes, NEAR, np.inf))
+    step = slip.speed(s) / np.where(changes, real.slope(s), 1.0)  # 0 but for its dual part
+    cut = namespace(step).where(changes, s - step, 0.0)
     cut = namespace(cut, until).minimum(cut, until)
     keep: Number = 1.0
     gain: Number = 0.0

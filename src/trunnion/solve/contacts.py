@@ -99,15 +99,23 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
     if turns:
         if joint in walk.system.screws:
             lever = walk.values[f"{path}.pin.radius"]
-            yield from (_thread(walk, name, lever, speed, zero) for name in walk.system.screws[joint])
+            for name in walk.system.screws[joint]:  # a square thread at its mean radius r, tan λ = lead/(2 π r):
+                lead = walk.system.ratio(walk.values, name)  # F sec λ presses, friction acts along it
+                xp = namespace(lead, lever)
+                helix = xp.sqrt(lever * lever + lead * lead)
+                secant = helix / lever / (xp.abs(lead) if name in walk.system.turned_round else 1.0)
+                # the load is of what the gear pair puts into its second joint, the force F along the screw or its
+                # torque; a guide of length 2/s under a moment M alone presses with |M| s
+                load, moment = GuideLoad((1.0, 0.0), 2.0 / secant), lever * lever / helix
+                yield Rubbing(load, helix * speed, Wrench(0.0, 0.0, moment), zero, amount=moment)
             return
         lever, turning = _lever(walk, joint)
         yield Rubbing(PinLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=turning)
         return
     axis, second = walk.ends(joint)
     middle = plane.place_of(second)
-    load = GuideLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], middle)
-    yield Rubbing(load, speed, plane.about((axis.c, axis.s), 0.0, middle), zero)
+    guide = GuideLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], middle)
+    yield Rubbing(guide, speed, plane.about((axis.c, axis.s), 0.0, middle), zero)
 
 
 def _lever(walk: Forward, joint: str) -> tuple[Number, Number | None]:
@@ -117,31 +125,27 @@ def _lever(walk: Forward, joint: str) -> tuple[Number, Number | None]:
     return (walk.values[f"{path}.pin.radius"], 1.0) if arm is None else (arm, None)
 
 
-def _thread(walk: Forward, name: str, lever: Number, speed: Number, zero: Number) -> Rubbing:
-    """A square thread at its mean radius r: F sec λ presses, friction acts along it, tan λ = lead/(2 π r).
-
-    The load is of what the gear pair puts into its second joint: the force F along the screw, or its torque.
-    """
-    lead = walk.system.ratio(walk.values, name)
-    xp = namespace(lead, lever)
-    helix = xp.sqrt(lever * lever + lead * lead)
-    secant = helix / lever / (xp.abs(lead) if name in walk.system.turned_round else 1.0)
-    # a guide of length 2/s under a moment M alone presses with |M| s
-    load = GuideLoad((1.0, 0.0), 2.0 / secant)
-    moment = lever * lever / helix
-    return Rubbing(load, helix * speed, Wrench(0.0, 0.0, moment), zero, amount=moment)
-
-
 def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     """Of a joint in space."""
-    pair, middle = walk.pair(joint), bearing_middle(walk, joint)
+    pair, middle, values, path = walk.pair(joint), bearing_middle(walk, joint), walk.values, f"joints.{joint}"
     second = walk.ends(joint)[1]
     axis = second.z
     if pair.ball:
-        yield _ball(walk, joint)
+        spin, radius = walk.against(joint).u, values[f"{path}.pin.radius"]
+        square = dot(spin, spin)
+        speed, share = _speed(square, primal(square) > 0)
+        unit = Screw(NULL, scaled(radius, scaled(share, spin)))
+        still = walk.speed(joint) <= walk.noise(joint, turns=True)
+        yield Rubbing(PinLoad(), radius * speed, unit, still, amount=radius, turning=1.0)
         return
-    if pair.crossed:
-        yield from _two_pins(walk, joint, middle)
+    if pair.crossed:  # each pin is a revolute bearing; friction of one is carried by the other as a moment across it
+        lever, speed = values[f"{path}.pin.radius"], walk.speed(joint)
+        share = lever / np.where(speed > 0, speed, np.inf)  # its friction is told as a torque about the relative spin
+        for pin, rate in zip(walk.ends(joint), walk.pin_rates(joint), strict=True):
+            still = np.abs(primal(rate)) <= walk.noise(joint, turns=True)
+            load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], walk.system.summed(joint))
+            unit = Screw(NULL, scaled(lever, pin.z))
+            yield Rubbing(load, lever * rate, unit, still, amount=share * rate, felt=True)
         return
     load = _bearing(walk, joint, second._replace(place=middle))
     turn, slide = walk.rates(joint)
@@ -193,25 +197,3 @@ def _bearing(walk: SpatialWalk, joint: str, frame: Frame) -> BearingLoad:
         slope = walk.system.lead(values, joint) / values[f"{path}.pin.radius"]
         flank = namespace(slope).sqrt(1 + slope * slope)
     return BearingLoad(frame, values[f"{path}.pin.bearing"], walk.system.summed(joint), flank=flank)
-
-
-def _ball(walk: SpatialWalk, joint: str) -> Rubbing:
-    turn, radius = walk.against(joint).u, walk.values[f"joints.{joint}.pin.radius"]
-    square = dot(turn, turn)
-    speed, share = _speed(square, primal(square) > 0)
-    unit = Screw(NULL, scaled(radius, scaled(share, turn)))
-    zero = walk.speed(joint) <= walk.noise(joint, turns=True)
-    return Rubbing(PinLoad(), radius * speed, unit, zero, amount=radius, turning=1.0)
-
-
-def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3) -> Iterator[Rubbing]:
-    """Each pin of the cross is a revolute bearing; friction of one is carried by the other as a moment across it."""
-    values, path = walk.values, f"joints.{joint}"
-    lever = values[f"{path}.pin.radius"]
-    spin = walk.speed(joint)
-    share = lever / np.where(spin > 0, spin, np.inf)  # its friction is told as a torque about the relative spin
-    for pin, rate in zip(walk.ends(joint), walk.pin_rates(joint), strict=True):
-        still = np.abs(primal(rate)) <= walk.noise(joint, turns=True)
-        load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], walk.system.summed(joint))
-        unit = Screw(NULL, scaled(lever, pin.z))
-        yield Rubbing(load, lever * rate, unit, still, amount=share * rate, felt=True)

@@ -282,19 +282,6 @@ class Forward:
         )
         return 0.0, axis.c * (to_x - x) + axis.s * (to_y - y)
 
-    def slip_motion(self, joint: str) -> tuple[Number, Number]:
-        """Slip of the contact of a joint that moves one way only, along its thread if it has one; m/s, m/s²."""
-        turns = self.system.turns(joint)
-        rate, second = (both[0 if turns else 1] for both in (self.rates(joint), self.second_rates(joint)))
-        if not turns:
-            return rate, second
-        lever, lead = self.values[f"joints.{joint}.pin.radius"], self.system.lead(self.values, joint)
-        if joint in self.system.screws:
-            lead = self.system.ratio(self.values, self.system.screws[joint][0])
-        if not is_zero(lead):
-            lever = namespace(lever, lead).sqrt(lever * lever + lead * lead)
-        return lever * rate, lever * second
-
     def hole(self, joint: str) -> Any:
         """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide; in
         space z along the axis, in the middle of the bearing."""

@@ -403,38 +403,36 @@ def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
 
 
 def _rounds(real: FrictionProblem, start: _Iterate, rounds: int, method: FrictionMethod) -> _Iterate:
-    """At most so many rounds in the lanes that are not done; those that are stay as they are."""
+    """At most so many rounds in the lanes that are not done; those that are stay as they are.
+
+    A round is [D] steps 2-5, friction from the last loads, or a step of Newton's method, whose A is that of the side of
+    each kink on which the normal loads are. What a lane comes to does not depend on the lanes beside it. It is done
+    when every friction is what its law says for the load, whatever the last round changed.
+    """
 
     def step(row: list[Number]) -> list[Number]:
-        return _round(real, start.of_row(row), method).in_row()
+        at = start.of_row(row)
+        goes_on = ~(at.done > 0)
+        if method.name == "newton":
+            rows = real.map_derivative(real.state(at.forces, at.normals))
+            forces = _corrected(at.forces, at.gaps, rows)
+            contraction = largest([functools.reduce(operator.add, map(np.abs, row)) for row in rows])
+        else:
+            forces = real.target(at.normals)
+        forces = _chosen(goes_on, forces, at.forces)
+        state = real.state(forces)
+        gaps = real.gaps(state, forces)
+        change = largest([a - b for a, b in zip(state.normals, at.normals, strict=True)])
+        if method.name != "newton":
+            measurable = np.isfinite(at.change) & (at.change > 0)
+            contraction = np.where(measurable, change / np.where(measurable, at.change, 1.0), 0.0)
+        # a lane of NaN has nothing to wait for
+        left = real.excess(gaps, forces) > SETTLED if method.criterion is None else change > method.criterion
+        change, contraction = _chosen(goes_on, [change, contraction], [at.change, at.contraction])
+        done, count = 1.0 - (goes_on & left), at.rounds + goes_on
+        return _Iterate(forces, state.normals, gaps, change, contraction, done, count).in_row()
 
     return start.of_row(looped(step, start.in_row(), rounds, lambda row: row[-2] > 0))
-
-
-def _round(real: FrictionProblem, at: _Iterate, method: FrictionMethod) -> _Iterate:
-    """One round: [D] steps 2-5, friction from the last loads, or a step of Newton's method.
-
-    Its A is that of the side of each kink on which the normal loads are. What a lane comes to does not depend on the
-    lanes beside it. It is done when every friction is what its law says for the load, whatever the last round changed.
-    """
-    goes_on = ~(at.done > 0)
-    if method.name == "newton":
-        rows = real.map_derivative(real.state(at.forces, at.normals))
-        forces = _corrected(at.forces, at.gaps, rows)
-        contraction = largest([functools.reduce(operator.add, map(np.abs, row)) for row in rows])
-    else:
-        forces = real.target(at.normals)
-    forces = _chosen(goes_on, forces, at.forces)
-    state = real.state(forces)
-    gaps = real.gaps(state, forces)
-    change = largest([a - b for a, b in zip(state.normals, at.normals, strict=True)])
-    if method.name != "newton":
-        measurable = np.isfinite(at.change) & (at.change > 0)
-        contraction = np.where(measurable, change / np.where(measurable, at.change, 1.0), 0.0)
-    # a lane of NaN has nothing to wait for
-    left = real.excess(gaps, forces) > SETTLED if method.criterion is None else change > method.criterion
-    change, contraction = _chosen(goes_on, [change, contraction], [at.change, at.contraction])
-    return _Iterate(forces, state.normals, gaps, change, contraction, 1.0 - (goes_on & left), at.rounds + goes_on)
 
 
 def _chosen(lanes: Number, row: Sequence[Number], others: Sequence[Number]) -> list[Number]:

@@ -21,8 +21,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.motion import Span
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.forward import Forward, forward
+from trunnion.solve.switches import near, turned
 from trunnion.solve.system import Cycle, System, Values, freed
-from trunnion.solve.turns import near, turned
 
 __all__ = ["Inverse", "driven_at_outputs"]
 
@@ -56,7 +56,11 @@ class Inverse:
 
     def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
         """Coordinate, rate and second derivative of a driver at times, s; NaN past a dead centre of the drivers."""
-        renamed = self._renamed(values)
+        renamed = dict(values)  # the numbers of each law stand under the joint that it is of
+        for driver, joint in self.moves.items():
+            before = f"drivers.{driver}."
+            numbers = ((path, value) for path, value in values.items() if path.startswith(before))
+            renamed |= {f"drivers.{joint}.{path.removeprefix(before)}": value for path, value in numbers}
         walk = forward(self.system, renamed, self.assembly, time)
         which = 0 if self.system.turns(name) else 1
         coordinate, rate, second = (of(name)[which] for of in (walk.coordinates, walk.rates, walk.second_rates))
@@ -70,16 +74,6 @@ class Inverse:
         rates, coordinates = self._ranges[name]
         travel = float(np.nanmax(coordinates) - np.nanmin(coordinates))
         return span._replace(one_way=False, peak=float(np.nanmax(np.abs(rates))), travel=travel)
-
-    def _renamed(self, values: Values) -> dict[str, Number]:
-        """The values with the numbers of each law under the joint that it is of."""
-        renamed = dict(values)
-        for name, joint in self.moves.items():
-            before = f"drivers.{name}."
-            for path, value in values.items():
-                if path.startswith(before):
-                    renamed[f"drivers.{joint}.{path.removeprefix(before)}"] = value
-        return renamed
 
     def _sense(self, values: Values, time: Number) -> Array:
         """The sign of the determinant of ∂(drivers)/∂(stated joints) at times, s."""

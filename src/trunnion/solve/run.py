@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -23,16 +24,18 @@ from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.inverse import Inverse, driven_at_outputs
-from trunnion.solve.memory import in_blocks, keep_pages
 from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
-__all__ = ["Run", "built", "prepare"]
+__all__ = ["CHUNK", "Run", "blocks", "built", "prepare"]
 
 TURN_STEPS = 720
 COMES_BACK = 1e-6  # of the mechanism's size
+CHUNK = 8192  # solved at a time: the arrays of a walk stay in cache
+JOINTS = 2**18  # at all the positions that are solved at a time: each takes some 300 bytes
+BLOCK = 30 * 2**20  # bytes; glibc learns from blocks of up to 32 MiB
 Found = TypeVar("Found")
 
 
@@ -59,7 +62,8 @@ class Run:
         """
         values = self.values if values is None else values
         if past is None:
-            past = self._past if values is self.values else self._histories(values)
+            nominal = values is self.values
+            past = self._past if nominal else histories(self.system, values, self.chosen.assembly, self.cycle)
         deflections = {joint: history.at(time) for joint, history in past.items()}
         conditions = replace(conditions or Given(), deflections=deflections)
         return solve(self.system, values, self.chosen.assembly, time, method, conditions)
@@ -102,11 +106,7 @@ class Run:
 
     @functools.cached_property
     def _past(self) -> dict[str, History]:
-        return self._histories(self.values)
-
-    @np.errstate(all="ignore")
-    def _histories(self, values: Values) -> dict[str, History]:
-        return histories(self.system, values, self.chosen.assembly, self.cycle)
+        return histories(self.system, self.values, self.chosen.assembly, self.cycle)
 
     @functools.cached_property
     def _found(self) -> dict[Hashable, Any]:
@@ -156,8 +156,13 @@ class Run:
         moves = self.cycle.duration > 0
         times = np.array([bend.time for bend in self.bends] if bends is None else bends, float)
         breaks = breaks_between(self.cycle, times) if moves else np.array([0.0, 1.0])
-        in_parts = in_blocks(look if moves else lambda time: look(0.0 * time), joints or len(self.system.joints))
-        return Courses.of(in_parts, breaks, like, accuracy_of(self.cycle, accuracy or Accuracy()))
+
+        def in_blocks(time: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+            parts = blocks(len(time), joints or len(self.system.joints))
+            rows, states = zip(*(look(time[part] * moves) for part in parts), strict=True)
+            return np.concatenate(rows, axis=1), np.concatenate(states)
+
+        return Courses.of(in_blocks, breaks, like, accuracy_of(self.cycle, accuracy or Accuracy()))
 
     @functools.cached_property
     def determinacy(self) -> Determinacy | None:
@@ -254,3 +259,25 @@ def _unknown_turns(run: Run) -> dict[str, float]:
         fraction = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
         turns_of[joint] = float(fraction if abs(fraction - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
     return turns_of
+
+
+# ---- memory that is used again ---------------------------------------------------------------------------------
+
+
+def blocks(count: int, joints: int) -> Iterator[slice]:
+    """Parts of some positions that are solved at a time, so that memory does not grow with how many there are."""
+    size = max(1, min(CHUNK, JOINTS // max(1, joints)))
+    yield from (slice(low, min(low + size, count)) for low in range(0, count, size))
+
+
+@functools.cache
+def keep_pages() -> None:
+    """Let the C library keep the pages of arrays that are freed, for the next ones.
+
+    glibc returns freed memory at the top of its heap to the system beyond a threshold of 128 KiB, and what is asked for
+    anew then costs a page fault every 4 KiB: half the time of a walk over 20 000 positions. It raises the threshold to
+    twice the size of a mapped block that is freed (mallopt(3), M_MMAP_THRESHOLD), here without touching the block. Some
+    60 MiB at most stay with the process; other C libraries see an allocation and nothing else.
+    """
+    with suppress(MemoryError):
+        np.empty(BLOCK, np.uint8)

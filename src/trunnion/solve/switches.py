@@ -14,12 +14,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.model.parts import Spring
@@ -29,8 +29,8 @@ from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
-    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "root",
-    "shifts_of", "stated_bends", "tracked",
+    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "near", "root",
+    "shifts_of", "stated_bends", "tracked", "turned",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -50,6 +50,8 @@ SLOPED = 1e-6  # of the cycle: step of a difference
 CLOSE = 1e-10  # of the cycle: edges that are one
 NOISE = 1e-9  # of the largest value: zero but for rounding
 ROOT_ROUNDS = 60
+TURN = 2 * np.pi
+TURNING = Accuracy(1e-4, 1e-6, shortest=1e-6)  # of the rates, whose integrals tell whole turns
 
 
 @dataclass(frozen=True)
@@ -138,8 +140,25 @@ def stated_bends(of: Mechanisms) -> list[Bend]:
 
 def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
     yield from ((row, Bend(moment)) for row, moment in knots_of(of))
-    for k, scan in enumerate(_scans(of.system)):
-        yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
+    duration = np.array([cycle.duration for cycle in of.cycles])
+    turns = max(1.0, np.ceil(max(cycle.turns for cycle in of.cycles) - 1e-9))
+    for number, scan in enumerate(_scans(of.system)):
+        time = duration[:, None] * np.linspace(0.0, 1.0, int(min(scan.places * turns, MOST_SCANNED)) + 1)
+        switches = scan.switches(of, np.arange(len(duration)), time)
+        if not switches:
+            continue
+        courses = np.array([of.shaped(switch.number, time) for switch in switches])
+        noise = scan.noise * np.nanmax(np.abs(np.nan_to_num(courses)), axis=-1, keepdims=True)
+        courses = np.where(np.abs(courses) <= noise, 0.0, courses)
+        single = np.array([len(switch.levels) == 1 for switch in switches])
+        crossings = [_dips(single, courses, time, partial(scan.number, of))]
+        for k, (switch, course) in enumerate(zip(switches, courses, strict=True)):
+            crossings += [_passed(k, course, level, time) for level in _levels(of, switch, course, turns)]
+        every = _Crossing(*(np.concatenate(parts) for parts in zip(*crossings, strict=True)))
+        if len(every.row):
+            times = _located(every, partial(scan.number, of, every.row, every.function), duration[every.row])
+            for row, moment, function, level in zip(every.row, times, every.function, every.level, strict=True):
+                yield int(row), Bend(float(moment), number, int(function), float(level))
 
 
 def tracked(of: Mechanisms, bends: Sequence[Bend], moved: Callable[[Values, Array], Number]) -> Array:
@@ -279,27 +298,6 @@ class _Crossing(NamedTuple):
     at_high: Array
 
 
-def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float, int, float]]:
-    """(mechanism, time, function, level) of every passage that a scan shows."""
-    duration = np.array([cycle.duration for cycle in of.cycles])
-    turns = max(1.0, np.ceil(max(cycle.turns for cycle in of.cycles) - 1e-9))
-    time = duration[:, None] * np.linspace(0.0, 1.0, int(min(scan.places * turns, MOST_SCANNED)) + 1)
-    switches = scan.switches(of, np.arange(len(duration)), time)
-    if not switches:
-        return
-    courses = np.array([of.shaped(switch.number, time) for switch in switches])
-    noise = scan.noise * np.nanmax(np.abs(np.nan_to_num(courses)), axis=-1, keepdims=True)
-    courses = np.where(np.abs(courses) <= noise, 0.0, courses)
-    single = np.array([len(switch.levels) == 1 for switch in switches])
-    crossings = [_dips(single, courses, time, partial(scan.number, of))]
-    for k, (switch, course) in enumerate(zip(switches, courses, strict=True)):
-        crossings += [_passed(k, course, level, time) for level in _levels(of, switch, course, turns)]
-    every = _Crossing(*(np.concatenate(parts) for parts in zip(*crossings, strict=True)))
-    if len(every.row):
-        times = _located(every, partial(scan.number, of, every.row, every.function), duration[every.row])
-        yield from zip(every.row.tolist(), times.tolist(), every.function.tolist(), every.level.tolist(), strict=True)
-
-
 def _levels(of: Mechanisms, switch: Switch, course: Array, turns: float) -> Array:
     """The levels of a switch, (level, mechanism), that the courses of some mechanisms may pass."""
     levels = np.array([of.row(level) for level in switch.levels])
@@ -375,3 +373,36 @@ def root(
             least = np.minimum(0.5, settled / np.abs(b - c))
             share = np.clip(np.where(sure & np.isfinite(inverse), inverse, 0.5), least, 1 - least)
     return np.where(np.abs(fa) <= np.abs(fb), a, b)
+
+
+# ---- angles without jumps --------------------------------------------------------------------------------------
+
+
+def near(number: Number, to: Any, turn: float = TURN) -> Number:
+    """The number and so many whole turns that it is as near as can be to another."""
+    return number - turn * np.rint((primal(number) - to) / turn)
+
+
+def turned(
+    cycle: Cycle,
+    look: Callable[[Array], tuple[Array, NDArray[np.integer]]],
+    firsts: Callable[[Array], Sequence[Number]],
+    knots: Array,
+    span: tuple[float, float],
+) -> list[tuple[Array, Array]]:
+    """Times, s, and angles over a span, of each row of rates that `look` gives at times with the states there.
+
+    firsts: the angles of all rows at times, one a row, from which each goes on; knots: times, s, at which rates may
+    bend.
+    """
+    rates = Courses.of(look, breaks_between(cycle, knots, *span), None, accuracy_of(cycle, TURNING))
+    rows = [rates.integral(row) for row in range(len(rates.sizes))]
+    nodes = rows[0][0]
+    starts = np.argmax(np.isfinite(rates.at(nodes)), axis=1)
+    begins = [
+        float(np.broadcast_to(primal(angle), starts.shape)[row]) for row, angle in enumerate(firsts(nodes[starts]))
+    ]
+    return [
+        (time, angle - angle[start] + np.nan_to_num(begin))
+        for (time, angle), start, begin in zip(rows, starts, begins, strict=True)
+    ]

@@ -206,8 +206,16 @@ class System:
         joints = tuple(GroupJoint(place.kind, (a, b)) for place, (a, b) in zip(places, ends, strict=True))
         driven = tuple(names.index(name) for name in module.driven)
         if not self.spatial:
-            gears = tuple(self._gear(name, names) for name in module.gears)
-            return General(len(module.links), joints, driven, gears, redundant=module.redundant)
+            gears = []
+            for name in module.gears:
+                touching, turned_round = self.mechanism.gears[name].touches, name in self.turned_round
+                carriers = self.mechanism.carriers(name) if touching else None
+                if carriers and turned_round:
+                    carriers = carriers[1], carriers[0]
+                slide = 1 - turned_round if self.mechanism.gears[name].slides else None
+                first, second = (names.index(joint) for joint in self.gear_joints(name))
+                gears.append(GearPair(first, second, carriers, slide))
+            return General(len(module.links), joints, driven, tuple(gears), redundant=module.redundant)
         if module.kind == "CCC":
             elements = self.elements(self.mechanism.parameters())
             sides = (
@@ -217,14 +225,6 @@ class System:
                 return CylindricalDyad(2, joints)
         spins = tuple((number[link], names.index(a), names.index(b)) for link, a, b in module.spinning)
         return SpatialGroup(len(module.links), joints, driven, spins, redundant=module.redundant)
-
-    def _gear(self, name: str, names: Sequence[str]) -> GearPair:
-        first, second = (names.index(joint) for joint in self.gear_joints(name))
-        carriers = self.mechanism.carriers(name) if self.mechanism.gears[name].touches else None
-        turned_round = name in self.turned_round
-        if carriers and turned_round:
-            carriers = carriers[1], carriers[0]
-        return GearPair(first, second, carriers, 1 - turned_round if self.mechanism.gears[name].slides else None)
 
     @cached_property
     def turned_round(self) -> frozenset[str]:

@@ -129,7 +129,13 @@ def decompose(mechanism: Mechanism) -> Plan:
     mobility, spinning = mobility_by_formula(mechanism), passive(mechanism)
     table = LinkTable(mechanism, spinning)
     bodies = list(table.numbers)[1:]
-    determines, left_over = table.matched()
+    # constraints with the link that each determines, matched onto the links' freedoms; those left over
+    size = FREEDOMS[mechanism.space]
+    freedoms = {body: range(size * i, size * (i + 1)) for i, body in enumerate(bodies)}
+    suitable = [[freedom for link in links for freedom in freedoms[link]] for links in table.links_of.values()]
+    places = dict(zip(table.links_of, matching(suitable, size * len(bodies)), strict=True))
+    determines = {constraint: bodies[k // size] for constraint, k in places.items() if k >= 0}
+    left_over = [constraint for constraint, k in places.items() if k < 0]
     moved = mobility - len(spinning)
     # in space axes that are parallel or meet are common, and the rank at a pose tells; in the plane the count does
     by_rank = not planar or mechanism.over_constraint == "minimum-norm"
@@ -143,7 +149,7 @@ def decompose(mechanism: Mechanism) -> Plan:
         )
         fewer += "with a third crank does, state over_constraint: minimum-norm"
         raise MechanismError([Finding(what, "drivers", more if moved > drivers else fewer)])
-    if by_rank and (moved < drivers or FREEDOMS[mechanism.space] * len(bodies) > len(determines)):
+    if by_rank and (moved < drivers or size * len(bodies) > len(determines)):
         return _as_one(table, mobility, spinning)
     after: list[set[int]] = [set() for _ in bodies]
     for constraint, body in determines.items():
@@ -206,15 +212,6 @@ class LinkTable:
         """The moving links that the line of a spin goes through."""
         ends = self.spinning[constraint[0]] if constraint[1] == SPIN else ()
         return [link for name in ends for link in self.joints[name].links if self.numbers[link]]
-
-    def matched(self) -> tuple[dict[Constraint, str], list[Constraint]]:
-        """Constraints with the link each determines, matched onto the links' freedoms; those left over."""
-        size, bodies = FREEDOMS[self.mechanism.space], list(self.numbers)[1:]
-        freedoms = {body: range(size * i, size * (i + 1)) for i, body in enumerate(bodies)}
-        suitable = [[freedom for link in links for freedom in freedoms[link]] for links in self.links_of.values()]
-        places = dict(zip(self.links_of, matching(suitable, size * len(bodies)), strict=True))
-        determines = {constraint: bodies[k // size] for constraint, k in places.items() if k >= 0}
-        return determines, [constraint for constraint, k in places.items() if k < 0]
 
     def inside(self, links: list[str], placed: set[str]) -> list[str]:
         """Joints among some links, or between them and the known ones, in file order."""

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot
@@ -104,7 +103,14 @@ def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -
         for (k, i), rate in zip(group.free, null.T, strict=True):
             rates[k][i] = rate
         motions.append(_table(group.twists(pose, [None] * len(group.joints), rates), lanes))
-    normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
+    normals = []  # by which a self-stress presses on the contacts with friction, times size
+    for stress in stresses:
+        # a normal load is a seminorm, |N(R + S) − N(R)| ≤ N(S): where it is 0, so is what S changes of the friction
+        table = np.zeros((len(module.joints), CONTACTS, lanes))
+        for k, joint in enumerate(module.joints):
+            for i, contact in enumerate(contacts_of(walk, joint) if joint in rubbing else ()):
+                table[k, i] = pose.size * contact.load.normal(contact.load.felt(tuple(stress[k])))
+        normals.append(table)
     strained, pressed = (_present(module.joints, parts, stresses, regular) for parts in (stresses, normals))
     return ModuleDeterminacy(
         rows - rank,
@@ -208,18 +214,6 @@ def _by_least_squares(walk: Forward, number: int, group: Tree) -> Pose | None:
         return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
 
 
-def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: Number, stress: Array) -> Array:
-    """(joint, contact, lane): normal loads by which a self-stress presses on the contacts with friction, times size.
-
-    A normal load is a seminorm: |N(R + S) − N(R)| ≤ N(S). Where it is zero, so is what S changes of the friction.
-    """
-    normals = np.zeros((len(names), CONTACTS, stress.shape[-1]))
-    for k, joint in enumerate(names):
-        for i, contact in enumerate(contacts_of(walk, joint) if joint in rubbing else ()):
-            normals[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
-    return normals
-
-
 def _table(screws: Sequence[Any], lanes: int) -> Array:
     """(screw, 6, lane)."""
     return np.array([[np.broadcast_to(entry, lanes) for entry in flat(screw)] for screw in screws])
@@ -292,7 +286,24 @@ class Determinacy:
                     findings.append(Finding.error("mobility.redundant", "joints", what, remedy, **figures))
                 else:
                     findings += self._shared(part, what, figures)
-        return [*findings, *self._spinning()]
+        for _, (link, *points), members in spins_of(self.system):
+            where, drag = f"links.{link}", self.dragged.get(link)
+            who = f"the link '{link}'" if len(members) == 1 else f"the links {', '.join(members)} together"
+            what = f"{who} can spin about the line {points[0]}-{points[1]} (a passive freedom)"
+            remedy = "the analysis sets this spin to zero"
+            if drag is not None:
+                remedy += f"; friction of its joints would drag it with up to {readable(drag, 'N m')}"
+            figures = {"link": link, "links": members, "points": points}
+            findings.append(Finding.note("mobility.spin", where, what, remedy, torque=drag, **figures))
+            if link in self.spins:
+                what = f"{who} may spin about {points[0]}-{points[1]}, but a torque of up to "
+                what += f"{readable(self.spins[link], 'N m')} acts about that line"
+                ball = next(name for name in points if PAIRS[self.system.joints[name][0]].ball)
+                remedy = f"make it symmetric about the line, or {ball} a universal joint, which holds the spin"
+                # joints that err a little leave the line, and the spin is no less free
+                say = Finding.warning if self.system.mechanism.has_errors else Finding.error
+                findings.append(say("mobility.spin_loaded", where, what, remedy, torque=self.spins[link], **figures))
+        return findings
 
     def _shared(self, part: ModuleDeterminacy, what: str, figures: Mapping[str, Any]) -> Iterator[Finding]:
         """How redundant joints share their load."""
@@ -315,23 +326,3 @@ class Determinacy:
             remedy += "(cylindrical, spherical)"
             figures = {"joints": list(part.rubbing), "constraints": part.redundant, "change": part.change}
             yield Finding.warning("mobility.friction_open", "joints", what, remedy, **figures)
-
-    def _spinning(self) -> Iterator[Finding]:
-        """Links that can spin about the line of their joints, and what would drag them."""
-        for _, (link, *points), members in spins_of(self.system):
-            where, drag = f"links.{link}", self.dragged.get(link)
-            who = f"the link '{link}'" if len(members) == 1 else f"the links {', '.join(members)} together"
-            what = f"{who} can spin about the line {points[0]}-{points[1]} (a passive freedom)"
-            remedy = "the analysis sets this spin to zero"
-            if drag is not None:
-                remedy += f"; friction of its joints would drag it with up to {readable(drag, 'N m')}"
-            figures = {"link": link, "links": members, "points": points}
-            yield Finding.note("mobility.spin", where, what, remedy, torque=drag, **figures)
-            if link in self.spins:
-                what = f"{who} may spin about {points[0]}-{points[1]}, but a torque of up to "
-                what += f"{readable(self.spins[link], 'N m')} acts about that line"
-                ball = next(name for name in points if PAIRS[self.system.joints[name][0]].ball)
-                remedy = f"make it symmetric about the line, or {ball} a universal joint, which holds the spin"
-                # joints that err a little leave the line, and the spin is no less free
-                say = Finding.warning if self.system.mechanism.has_errors else Finding.error
-                yield say("mobility.spin_loaded", where, what, remedy, torque=self.spins[link], **figures)

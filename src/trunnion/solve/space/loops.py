@@ -166,7 +166,7 @@ class Loops:
         """Gap and its derivatives at coordinates (lane, kept) and offsets (lane, component), m."""
         group, count = self.group, c.shape[1]
         joints = self._coordinates(q)
-        _, placed, screws = self._place(q, c)
+        _, placed, screws = self.place(q, c)
         gap = _full(group.gaps(placed, joints, self.size), (len(q),))
         jacobian = np.broadcast_to(
             stacked(group.jacobian(placed, screws, self.size)), (len(q), gap.shape[1], len(group.free))
@@ -181,15 +181,11 @@ class Loops:
 
     def opening(self, q: Array, c: Array) -> Array:
         """Largest opening of a loop at every lane, in units of the size; rad."""
-        joints, (_, placed, _) = self._coordinates(q), self._place(q, c)
+        joints, (_, placed, _) = self._coordinates(q), self.place(q, c)
         return np.broadcast_to(self.group.opening(placed, joints, self.size), (len(q),)) / self.size
 
-    def frames(self, q: Array, c: Array) -> tuple[Any, ...]:
-        """Frames of the links."""
-        frames: tuple[Any, ...] = self._place(q, c)[0]
-        return frames
-
-    def _place(self, q: Array, c: Array) -> tuple[Any, ...]:
+    def place(self, q: Array, c: Array) -> tuple[Any, ...]:
+        """Frames of the links, elements of the joints and their screws."""
         placed: tuple[Any, ...] = self.group.place(self._elements(list(c.T)), self._coordinates(q))
         return placed
 
@@ -424,6 +420,6 @@ def _nearest(system: System, values: Values, loops: Loops) -> Array | None:
     if loops.group.free and np.all(singular[:, -1] <= RANK * singular[:, 0]):
         what = "the joints leave a freedom undetermined"
         raise MechanismError(Finding(what, "drivers", "add a driver, or joints to these links"))
-    far = distance(start(system, values), system.plan.modules[0], part.frames(q[good], none[good]))
+    far = distance(start(system, values), system.plan.modules[0], part.place(q[good], none[good])[0])
     order = np.lexsort((gap[good], np.round(np.broadcast_to(far, good.shape) / loops.size**2, 6)))
     return np.asarray(q[good[order[0]]])

@@ -116,7 +116,8 @@ def plays(system: System, values: Values) -> dict[str, Play]:
 def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
     """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
     back = under(walk, unit_loads(measure, walk))
-    return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
+    holes = {name: walk.in_hole(name, back.reactions[name]) for name in known}
+    return {name: play.model.loads(*holes[name], play.length) for name, play in known.items()}
 
 
 def unit_loads(measure: Measure, walk: Forward) -> dict[str, Any]:

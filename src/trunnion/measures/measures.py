@@ -37,8 +37,8 @@ from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work, springs, useful_powers
 from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.system import System, Values
 from trunnion.solve.switches import near, turned
+from trunnion.solve.system import System, Values
 
 __all__ = [
     "CURVES", "MOTIONS", "Formula", "Measure", "angle_at", "angles", "chosen", "coordinate_unit", "named", "near",

@@ -62,7 +62,7 @@ _JOINTS = (
     Fault(
         "friction-pair-factor-ignored",
         "joints/friction.py",
-        '(parameters["pair_factor"] * parameters["coefficient"]) * normal',
+        '(parameters.get("pair_factor", 1.0) * parameters["coefficient"]) * normal',
         'parameters["coefficient"] * normal',
         ("tests/invariants/test_laws.py",),
     ),

@@ -30,6 +30,7 @@ from trunnion.algebra import plane
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import Frame
 from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, minus, scaled
+from trunnion.joints.contact_loads import length_of
 
 __all__ = [
     "CLEARANCE_MODELS", "ClearanceModel", "described", "describing", "ellipse_error", "leaning", "pin_transform",
@@ -153,18 +154,6 @@ def _pin_loads(force: Vector, moment: Vector, length: Number) -> list[Vector]:
     return [(hx - gx, hy - gy), (hx + gx, hy + gy)]
 
 
-def _size(load: Vector) -> Number:
-    """|Q|, with the derivative 0 where it is 0."""
-    if len(load) == 1:
-        return namespace(load[0]).abs(load[0])
-    square: Number = 0.0
-    for part in load:
-        square = square + part * part
-    xp = namespace(square)
-    positive = square > 0
-    return xp.where(positive, xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
-
-
 def pressed(load: Vector, radius: Number, least: Number = 0.0) -> Vector:
     """Where a load presses the pin at one end: c = ρ Q/|Q|, m; the maximiser of Q · c over |c| ≤ ρ.
 
@@ -184,7 +173,7 @@ def worst_case(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
     """Most work of the loads over the whole play: Σ ρᵢ |Qᵢ|, in their unit times m."""
     total: Number = 0.0
     for load, radius in zip(loads, radii, strict=True):
-        total = total + radius * _size(load)
+        total = total + radius * length_of(*load)
     return total
 
 
@@ -220,7 +209,7 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
     spins = rate > 0
     scale = 1 / xp.sqrt(xp.where(spins, rate, 1.0))
     a = scaled(scale, spin)
-    size = _size(load)
+    size = length_of(*load)
     normal = size / xp.sqrt(1 + friction * friction)
     along = dot(pull, a)
     flat = minus(pull, scaled(along, a))
@@ -232,7 +221,7 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
     ahead = cross(a, flat)
     share = 1 / xp.sqrt(1 + slope * slope)
     turned = [share * (f + slope * g) for f, g in zip(flat, ahead, strict=True)]
-    width = _size(flat)
+    width = length_of(*flat)
     fit = root / xp.where(width > 0, width, 1.0)
     grown = size / xp.where(normal > 0, normal, 1.0)
     parts = [

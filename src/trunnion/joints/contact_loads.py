@@ -71,7 +71,7 @@ def halves(reaction: Reaction) -> tuple[Vector3, Vector3]:
     return (fx, fy, fz), (mx, my, mz)
 
 
-def _length(*parts: Number) -> Number:
+def length_of(*parts: Number) -> Number:
     """√Σ aᵢ²; of dual numbers without a derivative where all are 0."""
     square = parts[0] * parts[0]
     for part in parts[1:]:
@@ -99,7 +99,7 @@ class PinLoad(ContactLoad):
 
     def normal(self, reaction: Reaction) -> Number:
         """|F|."""
-        return _length(*reaction)
+        return length_of(*reaction)
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
         """F/|F|."""
@@ -107,7 +107,7 @@ class PinLoad(ContactLoad):
 
     def bound(self, reaction: Reaction) -> Number:
         """|F_x| + |F_y| in the plane."""
-        return np.abs(reaction[0]) + np.abs(reaction[1]) if len(reaction) == 2 else _length(*reaction)
+        return np.abs(reaction[0]) + np.abs(reaction[1]) if len(reaction) == 2 else length_of(*reaction)
 
     def feels(self, reaction: Reaction) -> bool:
         """Whether there is a force."""
@@ -173,10 +173,10 @@ class BearingLoad(ContactLoad):
         """N."""
         fx, fy, gx, gy, *more = reaction
         if self.summed:
-            normal = _length(fx, fy) + 2 * _length(gx, gy)
+            normal = length_of(fx, fy) + 2 * length_of(gx, gy)
         else:
             hx, hy = 0.5 * fx, 0.5 * fy
-            normal = _length(hx - gx, hy - gy) + _length(hx + gx, hy + gy)
+            normal = length_of(hx - gx, hy - gy) + length_of(hx + gx, hy + gy)
         if self.width is not None:
             normal = normal + 2 * namespace(more[1]).abs(more[1]) / self.width
         if self.flank is not None:
@@ -187,13 +187,13 @@ class BearingLoad(ContactLoad):
         """∂N/∂ of what it feels: by the directions of the contact forces."""
         fx, fy, gx, gy, *more = reaction
         if self.summed:
-            px, py = _shares(_length(fx, fy), fx, fy)
-            tx, ty = (2 * share for share in _shares(_length(gx, gy), gx, gy))
+            px, py = _shares(length_of(fx, fy), fx, fy)
+            tx, ty = (2 * share for share in _shares(length_of(gx, gy), gx, gy))
         else:
             hx, hy = 0.5 * fx, 0.5 * fy
             mx, my, qx, qy = hx - gx, hy - gy, hx + gx, hy + gy
-            ax, ay = _shares(_length(mx, my), mx, my)
-            bx, by = _shares(_length(qx, qy), qx, qy)
+            ax, ay = _shares(length_of(mx, my), mx, my)
+            bx, by = _shares(length_of(qx, qy), qx, qy)
             px, py, tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by), bx - ax, by - ay
         if not more:
             return px, py, tx, ty

@@ -15,8 +15,8 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
-    "FRICTION_LAWS", "FrictionLaw", "LawParameter", "coulomb", "dahl", "directed", "lugre", "rolling", "stiction",
-    "stribeck", "viscous",
+    "FRICTION_LAWS", "FrictionLaw", "LawParameter", "coulomb", "dahl", "directed", "lugre", "rolling", "stribeck",
+    "viscous",
 ]  # fmt: skip
 
 GONE = -700.0  # of which e^x leaves nothing of a coefficient, and which machine code still takes
@@ -81,7 +81,7 @@ def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
     a worn-in bearing (Baranov 1979, cited by [D]). At slip = 0 the force is an interval, here its middle, 0.
     """
     xp = namespace(normal, slip)
-    return -xp.sign(slip) * (parameters["pair_factor"] * parameters["coefficient"]) * normal
+    return -xp.sign(slip) * (parameters.get("pair_factor", 1.0) * parameters["coefficient"]) * normal
 
 
 def viscous(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -92,13 +92,8 @@ def viscous(normal: Number, slip: Number, **parameters: Number) -> Number:
     return coulomb(normal, slip, **parameters) - parameters["viscous"] * slip * normal
 
 
-def stiction(normal: Number, slip: Number, **parameters: Number) -> Number:
-    """Coulomb friction whose coefficient at rest, f_s = static, falls to f = coefficient where sliding begins."""
-    return -namespace(normal, slip).sign(slip) * parameters["coefficient"] * normal
-
-
 def stiction_at_rest(normal: Number, slip: Number, **parameters: Number) -> Number:
-    """−sgn(slip about to begin) f_s N."""
+    """The value at rest of a coefficient, f_s = static, that falls to f where sliding begins: −sgn(slip) f_s N."""
     return -namespace(normal, slip).sign(slip) * parameters["static"] * normal
 
 
@@ -166,16 +161,6 @@ def _stribeck_curve(slip: Number, parameters: Mapping[str, Number]) -> Number:
     return f + (parameters["static"] - f) * xp.exp(xp.maximum(-(ratio * ratio), GONE))
 
 
-def rolling_bearing(normal: Number, slip: Number, **parameters: Number) -> Number:
-    """Rolling bearing: friction torque ½ μ P d with the bore diameter d, so the force on the bore is −sgn(v) μ P.
-
-    The pin's radius is that of the bore. Source: SKF, Rolling bearings (catalogue), "Estimating the frictional
-    moment": M = 0.5 μ P d, with μ from 0.001 (self-aligning ball) to 0.0025 (cage-less needle roller).
-    """
-    xp = namespace(normal, slip)
-    return -xp.sign(slip) * parameters["coefficient"] * normal
-
-
 def rolling(normal: Number, slip: Number, **parameters: Number) -> Number:
     """Rolling friction with a lever arm f: a moment f N against the rate; −sgn(v) N at the lever f."""
     xp = namespace(normal, slip)
@@ -225,7 +210,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         validity="lubricated sliding; the viscous part is assumed proportional to the load",
     ),
     "stiction": FrictionLaw(
-        stiction,
+        coulomb,
         {"coefficient": _COEFFICIENT, "static": _STATIC},
         source="B. Armstrong-Hélouvry et al., Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7",
         validity="dry sliding that begins with a jerk; speed-independent; the coefficient at rest counts at rest alone",
@@ -276,13 +261,14 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         relaxation=lugre_relaxation,
     ),
     "rolling-bearing": FrictionLaw(
-        rolling_bearing,
+        coulomb,
         {
             "coefficient": LawParameter(
                 default=0.0015, meaning="bearing's friction coefficient; 0.0015: deep groove ball"
             )
         },
-        source="SKF, Rolling bearings, estimating the frictional moment: M = 0.5 μ P d",
+        source="SKF, Rolling bearings, estimating the frictional moment: M = 0.5 μ P d, d the bore, 2 radius; μ from "
+        "0.001 (self-aligning ball) to 0.0025 (cage-less needle roller)",
         validity="load about 0.1 of the dynamic rating, good lubrication, normal speed",
         scale="coefficient",
     ),

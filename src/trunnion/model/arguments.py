@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import inspect
-import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from numbers import Integral, Real
-from types import NoneType, UnionType
+from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
@@ -31,14 +31,6 @@ BY_METHOD = {
 REMEDIES = {
     "Mechanism": ": trunnion.read(FILE) makes one",
     "FrictionMethod": "; mechanism.with_friction('off') leaves friction out",
-}
-WORDS = {
-    int: "whole number",
-    float: "number",
-    str: "text",
-    os.PathLike: "path",
-    Mapping: "mapping",
-    Callable: "function",
 }
 NOUNS = {"methods": "method", "name": "method"}  # of studies, and of friction
 LISTS = (Sequence, Iterable)
@@ -83,26 +75,27 @@ def strict_arguments(public: Public) -> Public:
 
 
 def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
-    parameters = inspect.signature(function).parameters
-    names = list(parameters)
+    signature = inspect.signature(function)
+    parameters = signature.parameters
+    names = [name for name in parameters if name not in ("self", "cls")]
     closed = not any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
 
     @functools.cache
-    def hints() -> dict[str, Any]:
-        """What the annotations mean where the function stands; nothing said is anything."""
-        place, none = inspect.unwrap(function).__globals__, inspect.Parameter.empty
-        annotations = {name: parameter.annotation for name, parameter in parameters.items()}
-        return {name: Any if hint is none else eval(hint, place) if isinstance(hint, str) else hint
-                for name, hint in annotations.items()}  # fmt: skip
+    def meaning(name: str) -> Any:
+        """What an annotation means where the function stands; without one, and of further arguments, anything."""
+        hint, parameter = parameters[name].annotation, parameters[name]
+        if hint is parameter.empty or parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            return Any
+        return eval(hint, inspect.unwrap(function).__globals__) if isinstance(hint, str) else hint
 
     @functools.wraps(function)
     def strict(*args: Any, **keywords: Any) -> Any:
         if closed:
-            check_keywords(f"{call}()", keywords, [name for name in names if name not in ("self", "cls")])
-        values = {**dict(zip(names, args, strict=False)), **keywords}
-        checked = {name: held(call, name, value, hints().get(name, Any)) for name, value in values.items()}
-        return function(*[checked[name] for name in names[: len(args)]], *args[len(names) :],
-                        **{name: checked[name] for name in keywords})  # fmt: skip
+            check_keywords(f"{call}()", keywords, names)
+        bound = signature.bind(*args, **keywords)
+        for name, value in bound.arguments.items():
+            bound.arguments[name] = held(call, name, value, meaning(name))
+        return function(*bound.args, **bound.kwargs)
 
     return strict
 
@@ -119,12 +112,14 @@ def held(call: str, name: str, value: Any, hint: Any) -> Any:
             return values
     choices = [word for kind in (*kinds, member) if get_origin(kind) is Literal for word in get_args(kind)]
     if choices and all(isinstance(text, str) for text in values):
-        noun, remedy = NOUNS.get(name, name), f"use {_either(choices)}"
+        noun, remedy = NOUNS.get(name, name), f"use {' or '.join(choices)}"
         wrong = [text for text in values if text not in choices]
         raise MechanismError([Finding(f"there is no {noun} '{text}'", noun, remedy) for text in wrong])
-    words = _either(_worded(kind) for kind in kinds if kind is not NoneType)
-    remedy = next((REMEDIES[kind.__name__] for kind in kinds if getattr(kind, "__name__", "") in REMEDIES), "")
-    raise TypeError(f"{call}({name}={_short(value)}) takes {words}{remedy}")
+    kind = re.sub(r"[\w.]+\.(?=\w)", "", inspect.formatannotation(hint))  # as documented: Sequence[str] | None
+    remedy = next((REMEDIES[part] for part in re.findall(r"\w+", kind) if part in REMEDIES), "")
+    text = repr(value)
+    short = text if len(text) <= LONGEST and "\n" not in text else f"{type(value).__name__}(…)"
+    raise TypeError(f"{call}({name}={short}) takes {kind}{remedy}")
 
 
 def _kinds(hint: Any) -> tuple[Any, ...]:
@@ -145,26 +140,3 @@ def _fits(value: Any, hint: Any) -> bool:
     if hint in (int, float):
         return isinstance(value, Integral if hint is int else Real) and not isinstance(value, bool)
     return hint is Any or isinstance(value, (bool, np.bool_) if hint is bool else origin or hint)
-
-
-def _worded(kind: Any) -> str:
-    """A kind in words: a whole number, a list of texts, a Mechanism."""
-    if kind is bool:
-        return "True or False"
-    if get_origin(kind) is Literal:
-        return _either(map(repr, get_args(kind)))
-    if get_origin(kind) in LISTS:
-        return f"a list of {_either(_worded(hint).removeprefix('a ') + 's' for hint in _kinds(get_args(kind)[0]))}"
-    kind = get_origin(kind) or kind
-    return f"a {WORDS.get(kind, kind.__name__)}"
-
-
-def _either(words: Iterable[str]) -> str:
-    *others, last = words
-    return f"{', '.join(others)} or {last}" if others else last
-
-
-def _short(value: Any) -> str:
-    """A value as a message repeats it; of what is long its type."""
-    text = repr(value)
-    return text if len(text) <= LONGEST and "\n" not in text else f"{type(value).__name__}(…)"

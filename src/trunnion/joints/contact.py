@@ -97,25 +97,28 @@ def _missing(factor: float, restitution: float) -> float:
     return float((factor * (1 + restitution) - logarithms) / factor**2)
 
 
-def _root(missing: Callable[[float], float], most: float) -> float:
-    """Where a function passes 0 between 0 and `most`."""
-    from scipy.optimize import bisect  # only where a joint is in play
-
-    return float(bisect(missing, 0.0, most, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=HALVINGS))
+def _halved(low: float, high: float, missing: Callable[[float], float]) -> float:
+    """Where a function passes 0 from above."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if missing(middle) > 0 else (low, middle)
+        if high - low <= 4e-16 * high:
+            break
+    return 0.5 * (low + high)
 
 
 def restitution_of(factor: float) -> float:
     """The restitution e that a loss factor χ gives, from 1 (χ = 0) down."""
     if factor == 0.0 or np.isinf(factor):
         return 1.0 if factor == 0.0 else 0.0
-    return _root(lambda restitution: _missing(factor, restitution), min(1.0, (1.0 - 1e-16) / factor))
+    return _halved(0.0, min(1.0, (1.0 - 1e-16) / factor), lambda restitution: _missing(factor, restitution))
 
 
 def loss_factor(restitution: float) -> float:
     """The loss factor χ from which the restitution e comes back: the equation above, solved for χ < 1/e."""
     if restitution >= 1.0 or restitution <= 0.0:
         return 0.0 if restitution > 0.0 else np.inf
-    return _root(lambda factor: _missing(factor, restitution), 1.0 / restitution)
+    return _halved(0.0, 1.0 / restitution, lambda factor: _missing(factor, restitution))
 
 
 CONTACT_LAWS: dict[str, ContactLaw] = {

@@ -92,7 +92,7 @@ def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
     def strict(*args: Any, **keywords: Any) -> Any:
         if closed:
             check_keywords(f"{call}()", keywords, names)
-        bound = signature.bind(*args, **keywords)
+        bound = signature.bind_partial(*args, **keywords)
         for name, value in bound.arguments.items():
             bound.arguments[name] = held(call, name, value, meaning(name))
         return function(*bound.args, **bound.kwargs)

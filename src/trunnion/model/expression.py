@@ -22,11 +22,10 @@ import numpy as np
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, normalise, unit
 
-__all__ = ["DIAMETER", "MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse"]
+__all__ = ["MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse", "unitless_angles"]
 
 MAX_LENGTH = 500
 MAX_DEPTH = 40
-DIAMETER = ("Ø", "ø", "⌀", "∅")  # signs of drawings before a number
 
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![0-9.])"  # whole: a part of a number is none
 _WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?:\.[0-9]{1,2})?(?![\w.]))?"
@@ -85,7 +84,7 @@ class Literal:
 
 
 @dataclass(frozen=True)
-class _Part:
+class Term:
     """A part of an expression, compiled.
 
     value: of the values of the names; dimension: from the dimensions of the names; operands: what it is made of;
@@ -96,7 +95,7 @@ class _Part:
     value: Evaluator
     dimension: Callable[[Dimensions], Dimension | None]
     operands: tuple[Literal | str, ...]
-    parts: tuple[_Part, ...] = ()
+    parts: tuple[Term, ...] = ()
     passes: Callable[[Dimensions, bool], bool] | None = None
     function: str = ""
 
@@ -118,7 +117,7 @@ class Expression:
     kinks: tuple[Evaluator, ...]
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
-    _part: _Part = field(repr=False)
+    term: Term = field(repr=False)
 
     @classmethod
     def of(cls, tree: ast.expr, operands: Mapping[str, Literal | str]) -> Expression:
@@ -137,14 +136,7 @@ class Expression:
 
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
-        return self._part.dimension(names)
-
-    def unitless_angles(self, names: Dimensions, plain: Collection[str], angle: bool) -> Iterator[str | float]:
-        """Numbers without a unit, and dimensions that are such (plain), that are taken as radians.
-
-        They stand for an angle where the whole is one, beside a term that is one, or in sin, cos and tan.
-        """
-        return _unitless(self._part, names, plain, angle)
+        return self.term.dimension(names)
 
 
 def literal(number: str, unit_text: str) -> Literal:
@@ -170,8 +162,6 @@ def parse(text: str) -> Expression:
         literal(under, unit_text)  # UnitError for what is no unit
         size = int(integer or 0) + int(over) / int(under)
         raise UnitError(f"'{text}' divides by {under} {unit_text}", f"write {size:.12g} {unit_text}")
-    if (signless := text.strip()).startswith(DIAMETER):
-        raise UnitError(f"'{signless[0]}' is not read in '{text}'", f"write {signless[1:].strip()}")
     source, operands = _tokens(normalise(text))
     try:
         tree = ast.parse(source, mode="eval").body
@@ -237,7 +227,7 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Number, Number], Number]] = {
 }
 
 
-def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> _Part:
+def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Term:
     """The tree as nested closures. Constants are NumPy floats, so that 1/0 and (-1)^0.5 give inf and nan, data."""
     match tree:
         case ast.Name(id=key):
@@ -245,7 +235,7 @@ def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> _Part:
         case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):
             part, negative = _compile(inner, operands), isinstance(sign, ast.USub)
             value: Evaluator = (lambda names: -part.value(names)) if negative else part.value
-            return _Part(value, part.dimension, part.operands, (part,), lambda names, angle: angle)
+            return Term(value, part.dimension, part.operands, (part,), lambda names, angle: angle)
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _OPERATORS:
             return _binary(operator, _compile(left, operands), _compile(right, operands), _integer(right, operands))
         case ast.Call(func=ast.Name(id=key), args=arguments, keywords=[]):
@@ -253,13 +243,13 @@ def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> _Part:
     raise UnitError("an expression has a part that is no number, name, operator or function", _hint(""))
 
 
-def _operand(operand: Literal | str) -> _Part:
+def _operand(operand: Literal | str) -> Term:
     if isinstance(operand, Literal):
         constant = np.float64(operand.value)
         dimension = operand.dimension if operand.value or operand.unit else None  # a bare 0 fits anywhere
-        return _Part(lambda names: constant, lambda names: dimension, (operand,))
+        return Term(lambda names: constant, lambda names: dimension, (operand,))
     if operand == "pi":
-        return _Part(lambda names: np.float64(np.pi), lambda names: NUMBER, (operand,))
+        return Term(lambda names: np.float64(np.pi), lambda names: NUMBER, (operand,))
     if operand in FUNCTIONS:
         speed = "; an angular speed is in rpm or rad/s" if operand == "min" else ""
         raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…){speed}")
@@ -269,7 +259,7 @@ def _operand(operand: Literal | str) -> _Part:
         value = names[name]
         return np.float64(value) if isinstance(value, (float, int)) else value
 
-    return _Part(look_up, lambda names: names[name], (operand,))
+    return Term(look_up, lambda names: names[name], (operand,))
 
 
 def _integer(tree: ast.expr, operands: Mapping[str, Literal | str]) -> int | None:
@@ -282,7 +272,7 @@ def _integer(tree: ast.expr, operands: Mapping[str, Literal | str]) -> int | Non
     return -int(operand.value) if negative else int(operand.value)
 
 
-def _binary(operator: ast.operator, first: _Part, second: _Part, exponent: int | None) -> _Part:
+def _binary(operator: ast.operator, first: Term, second: Term, exponent: int | None) -> Term:
     """Two parts and an operator. exponent: the second as an int if it is a whole literal number."""
     combine, operands, parts = _OPERATORS[type(operator)], (*first.operands, *second.operands), (first, second)
 
@@ -309,15 +299,15 @@ def _binary(operator: ast.operator, first: _Part, second: _Part, exponent: int |
         return _combine(NUMBER, base, Fraction(exponent))
 
     if isinstance(operator, ast.Add | ast.Sub):
-        return _Part(value, terms, operands, parts, lambda names, angle: angle or terms(names) == ANGLE)
+        return Term(value, terms, operands, parts, lambda names, angle: angle or terms(names) == ANGLE)
     if isinstance(operator, ast.Mult | ast.Div):
-        return _Part(value, product, operands, parts)
+        return Term(value, product, operands, parts)
     if exponent is None:
-        return _Part(value, power, operands, parts)
-    return _Part(lambda names: first.value(names) ** exponent, power, operands, parts)  # duals below 0 have such powers
+        return Term(value, power, operands, parts)
+    return Term(lambda names: first.value(names) ** exponent, power, operands, parts)  # duals below 0 have such powers
 
 
-def _call(name: Literal | str, arguments: tuple[_Part, ...]) -> _Part:
+def _call(name: Literal | str, arguments: tuple[Term, ...]) -> Term:
     if isinstance(name, Literal):
         raise UnitError("an operator is missing before a parenthesis", "write a product as 2 * (a + b)")
     if name not in FUNCTIONS:
@@ -351,10 +341,10 @@ def _call(name: Literal | str, arguments: tuple[_Part, ...]) -> _Part:
         return function.takes == "angle" or (angle and function.gives == "same")
 
     operands = (name, *(operand for argument in arguments for operand in argument.operands))
-    return _Part(value, dimension, operands, arguments, passes, name)
+    return Term(value, dimension, operands, arguments, passes, name)
 
 
-def _kinks(part: _Part) -> Iterator[Evaluator]:
+def _kinks(part: Term) -> Iterator[Evaluator]:
     """Functions whose sign decides which side of a switch a part is on."""
 
     def less(first: Evaluator, other: Evaluator) -> Evaluator:
@@ -371,8 +361,12 @@ def _kinks(part: _Part) -> Iterator[Evaluator]:
         yield from _kinks(below)
 
 
-def _unitless(part: _Part, names: Dimensions, plain: Collection[str], angle: bool) -> Iterator[str | float]:
-    """`Expression.unitless_angles` of a part. angle: whether it is wanted as one."""
+def unitless_angles(part: Term, names: Dimensions, plain: Collection[str], angle: bool) -> Iterator[str | float]:
+    """Numbers without a unit, and dimensions that are such (plain), that are taken as radians.
+
+    They stand for an angle where the whole is one, beside a term that is one, or in sin, cos and tan. angle: whether
+    the part is wanted as one.
+    """
     if part.passes:
         angle = part.passes(names, angle)
     elif angle:
@@ -384,7 +378,7 @@ def _unitless(part: _Part, names: Dimensions, plain: Collection[str], angle: boo
                 yield float(part.value({}))
         angle = False
     for below in part.parts:
-        yield from _unitless(below, names, plain, angle)
+        yield from unitless_angles(below, names, plain, angle)
 
 
 def _combine(first: Dimension, second: Dimension, power: Fraction) -> Dimension:

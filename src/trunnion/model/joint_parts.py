@@ -20,7 +20,6 @@ from trunnion.joints.fits import fit
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS, Pair
 from trunnion.model.entry import Direction, Name, OneOf, Part, ReadOnlyDict, ShortForm, forms, problem
-from trunnion.model.expression import DIAMETER
 from trunnion.model.quantity import (
     Angle,
     AnyQuantity,
@@ -50,7 +49,6 @@ Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
 _FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
-_CLASSES = re.compile(r"\s*[A-Z]{1,2}[0-9]{1,2}\s*/\s*[a-z]{1,2}[0-9]{1,2}\s*")
 
 
 @dataclass(frozen=True)
@@ -69,13 +67,7 @@ class Fit:
             return source
         match = _FIT.match(source.strip()) if isinstance(source, str) else None
         if not isinstance(source, str) or not match:
-            what = "has no diameter" if _CLASSES.fullmatch(str(source)) else "is not a fit"
-            raise problem(f"{str(source)[:60]!r} {what}", "write diameter, hole and shaft as 20 mm H7/g6")
-        diameter = match["size"].lstrip("".join(DIAMETER)).strip()
-        plain = bool(re.fullmatch(r"[0-9]+(\.[0-9]*)?", diameter))
-        if plain or diameter != match["size"]:  # Ø 24 H7/g6
-            what = f"'{diameter}' has no unit" if plain else f"'{match['size'][0]}' is not read in '{source[:60]}'"
-            raise problem(what, f"write {diameter}{' mm' * plain} {match['hole']}/{match['shaft']}")
+            raise problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
         try:
             size = Quantity.read(match["size"], KINDS["length"])
         except UnitError as error:

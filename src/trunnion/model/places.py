@@ -110,12 +110,6 @@ def schema_findings(error: ValidationError, model: type[BaseModel], data: Mappin
             if entry["type"] != "too_short" or entry["loc"] not in parents]  # fmt: skip
 
 
-_INSTEAD = {  # what to write in place of a word that is none of the known, by key
-    "seat": "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}",
-    "tables.over": "write drive or time; a force over a path is an expression, as between(ram.Q.x, 223 mm, 230 mm)",
-}
-
-
 def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any]) -> Finding:
     location = tuple(part for part in error["loc"] if part not in ("[key]", *FORMS))  # without the marks of pydantic
     key = str(location[-1]) if location else ""
@@ -140,7 +134,6 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = f"{wrong}is not one of {context['expected']}", "write one of these"
         near = nearest(str(error["input"]), re.findall(r"'([^']*)'", context["expected"]))
         remedy = near if near.startswith("did you mean") else remedy
-        remedy = _INSTEAD.get(f"tables.{key}" if location[:1] == ("tables",) else key, remedy)
     elif kind in _MEANINGS:
         what, remedy = (text.format(**{"key": key, **context}) for text in _MEANINGS[kind])
     else:

@@ -166,42 +166,38 @@ class Varying(Numbers):
                 and (not entry.alias or entry.alias.startswith(DEFAULTS))}  # fmt: skip
 
     def tolerated(self) -> list[Tolerance]:
-        """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±."""
-        varied, written_limits = self.variations_by_path, self.tolerances()
-        return [
-            self._tolerance(entry, varied.get(path, ("", Variation()))[1], written_limits.get(path))
-            for path, entry in self.parameter_set.entries.items()
-            if path in varied or (path in written_limits and may_vary(entry))
-        ]
-
-    def _tolerance(self, entry: Entry, variation: Variation, written_limits: tuple[float, float] | None) -> Tolerance:
-        """Of a number, by its entry of `tolerances` and the limits that stand with the number itself.
+        """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±.
 
         Defaults are for what the distribution takes and the entry does not say; a default cpk is that beside the
         default cp.
         """
-        numbers, defaults = self.parameter_set, self.tolerance_defaults
-        distribution = variation.distribution or defaults.distribution
+        numbers, defaults, written_limits = self.parameter_set, self.tolerance_defaults, self.tolerances()
 
         def value(quantity: Quantity) -> float:
             return float(quantity.evaluate(numbers.dimension_values))
 
-        options: dict[str, float | tuple[float, ...]] = {}
-        for key in DISTRIBUTIONS[distribution]:
-            option = getattr(variation, key)
-            if option is None and not (key == "cpk" and variation.cp is not None):
-                option = getattr(defaults, key, None)
-            if option is not None:
-                options[key] = tuple(map(value, option)) if isinstance(option, tuple) else value(option)
-        lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
-        if variation.limits is not None:
-            lower, upper = value(variation.limits.lower), value(variation.limits.upper)
-        elif written_limits is not None:
-            lower, upper = written_limits
-        elif isinstance(sample := options.get("values"), tuple):
-            lower, upper = min(sample), max(sample)
-        direction = towards(entry.path, numbers.entries) if variation.direction else ""
-        return Tolerance(entry.path, float(numbers.nominal[entry.path]), lower, upper, distribution, options, direction)
+        varying: list[Tolerance] = []
+        for path, entry in numbers.entries.items():
+            if path not in self.variations_by_path and not (path in written_limits and may_vary(entry)):
+                continue
+            variation = self.variations_by_path.get(path, ("", Variation()))[1]
+            distribution = variation.distribution or defaults.distribution
+            options: dict[str, float | tuple[float, ...]] = {}
+            for key in DISTRIBUTIONS[distribution]:
+                option = getattr(variation, key)
+                if option is None and not (key == "cpk" and variation.cp is not None):
+                    option = getattr(defaults, key, None)
+                if option is not None:
+                    options[key] = tuple(map(value, option)) if isinstance(option, tuple) else value(option)
+            lower, upper = written_limits.get(path, (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan))
+            if variation.limits is not None:
+                lower, upper = value(variation.limits.lower), value(variation.limits.upper)
+            elif path not in written_limits and isinstance(sample := options.get("values"), tuple):
+                lower, upper = min(sample), max(sample)
+            direction = towards(path, numbers.entries) if variation.direction else ""
+            nominal = float(numbers.nominal[path])
+            varying.append(Tolerance(path, nominal, lower, upper, distribution, options, direction))
+        return varying
 
     def correlation(self) -> NDArray[np.float64]:
         """Correlation of the normal scores of the numbers of `tolerated`, in their order."""

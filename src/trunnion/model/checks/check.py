@@ -15,6 +15,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.model.checks import joints, parts, tolerances
+from trunnion.model.expression import unitless_angles
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Entry, ParameterSet, dimension_errors
 from trunnion.model.parts import AT, USUAL_PRESSURE_ANGLE, InertiaTensor, Link
@@ -385,10 +386,8 @@ def plain_angles(mechanism: Varying, entries: Iterable[tuple[Entry, Sayable]]) -
     largest: dict[str, tuple[str, float, str]] = {}  # where each stands, its value and a verb for it
     for entry, names in entries:
         expression, angle = entry.quantity.expression, entry.kind is KINDS["angle"]
-        numbers = (
-            expression.unitless_angles(names, plain, angle) if expression else [float(entry.quantity.source)] * angle
-        )
-        for number in numbers:
+        unitless = expression and unitless_angles(expression.term, names, plain, angle)
+        for number in unitless or [float(entry.quantity.source)] * angle:
             of_dimension = isinstance(number, str)
             value = float(mechanism.dimensions[number].evaluate()) if isinstance(number, str) else number
             where = f"dimensions.{number}" if of_dimension else entry.where

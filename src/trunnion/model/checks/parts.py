@@ -207,26 +207,14 @@ def _measure(value: Quantity, names: Dimensions) -> Dimension | None:
 
 def unknown_name(mechanism: Numbers, name: str, path: str, source: object, names: Dimensions) -> Finding:
     """A name in an expression that means nothing there."""
-    refers = "" if str(source).strip() == name else f"refers to '{name}', which "
-    what, remedy = f"'{source}' {refers}is not one of the dimensions", nearest(name, names)
     if name in ("off", "none"):
         return Finding(f"'{source}' is no number", path, "write 0")
-    if not path.startswith("loads."):
-        if PLACED in name or name in MOTION or name in mechanism.tables:
-            remedy = "motions of joints and points, drive, speed, time and tables are for loads"
-        elif not names:
-            remedy = f"state it, as in dimensions: {{{as_key(name)}: 30 mm}}"
-        return Finding(what, path, remedy)
-    if name in MOTION:
-        return Finding(f"'{source}' refers to '{name}', but the model has no driver", path)
-    moves = motion_dimensions(mechanism, names)
+    refers = "" if str(source).strip() == name else f"refers to '{name}', which "
+    moves = motion_dimensions(mechanism, names) if path.startswith("loads.") else {}
     remedy = nearest(name, [*names, *moves])
-    if not remedy.startswith("did you mean"):
-        placed = [label for label in moves if PLACED in label]
-        remedy = (
-            f"name a dimension, a table, or the motion of a joint or point as {', '.join(placed[:1] + placed[-1:])}"
-        )
-    return Finding(what, path, remedy)
+    if not moves and (PLACED in name or name in MOTION or name in mechanism.tables):
+        remedy = "motions of joints and points, drive, speed, time and tables are for loads"
+    return Finding(f"'{source}' {refers}is not one of the dimensions", path, remedy)
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------

@@ -90,7 +90,7 @@ def vocabulary(mechanism: Mechanism) -> Vocabulary:
 
 
 def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
-    values, names = mechanism.parameters(), mechanism.parameter_set.names
+    values, names = mechanism.parameters(), mechanism.parameter_names
     kinds, shortest = measured(mechanism, mechanism.parameter_set.entries.values()), dict[str, str]()
     for ending, paths in names.endings.items():
         path = paths[0]

@@ -41,10 +41,10 @@ __all__ = [
     "merge_joint", "play", "stated",
 ]  # fmt: skip
 
-JOINT_TYPES = tuple(PAIRS)
 FRICTION_MODELS = ("two-contact", "pezzuti")
 
 
+JointType = Annotated[str, OneOf(PAIRS, "joint type")]
 Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
@@ -256,18 +256,7 @@ class JointDefaults(Part):
     seat: SeatChoice | None = None
 
 
-class _Typed(Part):
-    """What has a kind of pair."""
-
-    type: Annotated[str, OneOf(PAIRS, "joint type")]
-
-    @property
-    def pair(self) -> Pair:
-        """The pair of its type."""
-        return PAIRS[self.type]
-
-
-class Joint(_Typed):
+class Joint(Part):
     """A kinematic pair between two links, at the point of its own name on both.
 
     contact: its pin is in play as it moves in time, and touches its hole; all other analyses leave it out.
@@ -275,6 +264,7 @@ class Joint(_Typed):
     keeps its place while the joint turns, where its play is that of an analysis of tolerances; either if not stated.
     """
 
+    type: JointType
     links: Annotated[tuple[str, str], Refers("link", distinct=True)]
     pitch: Pitch | None = None
     pin: Pin | None = None
@@ -287,11 +277,17 @@ class Joint(_Typed):
     seat: SeatChoice | None = None
     seat_on: Name | None = None
 
+    @property
+    def pair(self) -> Pair:
+        """The pair of its type."""
+        return PAIRS[self.type]
 
-class LoopJoint(_Typed):
+
+class LoopJoint(Part):
     """A row of a dual Denavit–Hartenberg table: the joint, then the link after it up to the next joint."""
 
     joint: Name
+    type: JointType
     link: Name
     twist: Angle = Quantity(0, KINDS["angle"])
     distance: Length = Quantity(0, KINDS["length"])

@@ -31,7 +31,7 @@ from trunnion.model.rules import Within, markers
 from trunnion.model.tolerance_parts import Limits, Variation
 from trunnion.model.units import ANY, KINDS, Kind, unit
 
-__all__ = ["LIMITS", "Entry", "Numbers", "ParameterSet", "dimension_errors", "entries", "measured", "walk"]
+__all__ = ["LIMITS", "Entry", "Numbers", "ParameterSet", "dimension_errors", "measured", "walk"]
 
 Location = tuple[str | int, ...]
 Rules = tuple[Any, ...]  # of model.rules
@@ -75,25 +75,6 @@ class Entry:
     def is_limit(self) -> bool:
         """Whether it is one of two limits, and no dimension of that name."""
         return self.location[-1] in LIMITS and self.location[0] != "dimensions"
-
-
-def entries(mechanism: Fields) -> list[Entry]:
-    """Every number of a mechanism, defaults filled in; what an entry follows comes before it, dimensions apart.
-
-    Last come the deviations that the model states of them; those whose name means no number are left out.
-    """
-    numbers = {entry.path: entry for entry in _numbers(mechanism)}
-    if not mechanism.errors:
-        return [*numbers.values()]
-    names, dimensions = ParameterNames(numbers), dimension_kinds(mechanism)
-    errors: dict[str, Entry] = {}
-    for name, quantity in mechanism.errors.items():
-        with suppress(MechanismError):  # a finding of its own
-            path = names.resolve(name)
-            kind = dimensions.get(path.removeprefix("dimensions."), numbers[path].kind)
-            errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kind)
-    shifted = {path: replace(numbers[path], error=error.path) for path, error in errors.items()}
-    return [*{**numbers, **shifted}.values(), *errors.values()]
 
 
 def _numbers(mechanism: Fields) -> Iterator[Entry]:
@@ -274,7 +255,11 @@ def measured(mechanism: Fields, entries: Iterable[Entry]) -> dict[str, Kind]:
 
 
 class ParameterSet:
-    """The numbers of one mechanism, compiled."""
+    """The numbers of one mechanism, compiled.
+
+    nominal: values by path; dimension_values: those of the dimensions by name; errors: paths of the deviations, and of
+    the tilts and offsets of axes, all 0 in the ideal mechanism; resolve: the path that a name means.
+    """
 
     def __init__(self, entries: Iterable[Entry], dimensions: Mapping[str, Quantity]) -> None:
         listed = list(entries)
@@ -289,22 +274,17 @@ class ParameterSet:
 
         listed.sort(key=rank)  # stable: the rest keeps its order
         self.entries: dict[str, Entry] = {entry.path: entry for entry in listed}
-        self.names = ParameterNames(self.entries)
+        self.resolve = ParameterNames(self.entries).resolve
         numbers = [entry for entry in self.entries.values() if not entry.varies]
         self._dependent = [entry for entry in numbers if entry.depends]
         misaligned = re.compile(r"joints\..*\.misalignment\.(tilt|offset)")
-        self._ideal = {entry.path: 0.0 for entry in numbers
-                       if entry.path.startswith(ERRORS) or misaligned.fullmatch(entry.path)}  # fmt: skip
+        self.errors = tuple(entry.path for entry in numbers
+                            if entry.path.startswith(ERRORS) or misaligned.fullmatch(entry.path))  # fmt: skip
         self.nominal: dict[str, Number] = {}
-        self._nominal_names: dict[str, Number] = {}
+        self.dimension_values: dict[str, Number] = {}
         for entry in numbers:
-            self._evaluate(entry, self.nominal, self._nominal_names)
+            self._evaluate(entry, self.nominal, self.dimension_values)
         self.entries, self.nominal = ReadOnlyDict(self.entries), ReadOnlyDict(self.nominal)
-
-    @property
-    def errors(self) -> tuple[str, ...]:
-        """Paths of the deviations, and of the tilts and offsets of axes: all 0 in the ideal mechanism."""
-        return tuple(self._ideal)
 
     def stated(self, path: str) -> Number:
         """A number as it was stated, without the error that is added to it."""
@@ -313,12 +293,7 @@ class ParameterSet:
 
     def ideal(self, overrides: Mapping[str, Number] | None = None) -> dict[str, Number]:
         """Every number as `evaluate` gives it, without errors."""
-        return self.evaluate({**(overrides or {}), **self._ideal})
-
-    @property
-    def dimension_values(self) -> Mapping[str, Number]:
-        """Nominal values of the dimensions by name."""
-        return self._nominal_names
+        return self.evaluate({**(overrides or {}), **dict.fromkeys(self.errors, 0.0)})
 
     def evaluate(
         self, overrides: Mapping[str, Number] | None = None, deviations: Mapping[str, Number] | None = None
@@ -333,7 +308,7 @@ class ParameterSet:
             return values
         changed = {self.resolve(name): value for name, value in (overrides or {}).items()}
         added = {self.resolve(name): value for name, value in (deviations or {}).items()}
-        names = dict(self._nominal_names)
+        names = dict(self.dimension_values)
         for path in {**changed, **added}:
             value = changed[path] if path in changed else values[path]
             _put(path, value + added[path] if path in added else value, values, names)
@@ -352,10 +327,6 @@ class ParameterSet:
             value = value + values[entry.error]
         _put(entry.path, value, values, names)
 
-    def resolve(self, name: str) -> str:
-        """The path that a name means: a path, a dimension, or an ending that only one path has."""
-        return self.names.resolve(name)
-
 
 def _put(path: str, value: Number, values: dict[str, Number], names: dict[str, Number]) -> None:
     """A value at its path, and by its name if it is a dimension."""
@@ -370,8 +341,20 @@ class Numbers(Fields):
 
     @cached_property
     def entries(self) -> tuple[Entry, ...]:
-        """Every number of the mechanism and where it stands, defaults filled in; see `model.parameters.entries`."""
-        return tuple(entries(self))
+        """Every number of the mechanism, defaults filled in; what an entry follows comes before it, dimensions apart.
+
+        Last come the deviations that the model states of them; those whose name means no number are left out.
+        """
+        numbers = {entry.path: entry for entry in _numbers(self)}
+        names, dimensions = ParameterNames(numbers), dimension_kinds(self) if self.errors else {}
+        errors: dict[str, Entry] = {}
+        for name, quantity in self.errors.items():
+            with suppress(MechanismError):  # a finding of its own
+                path = names.resolve(name)
+                kind = dimensions.get(path.removeprefix("dimensions."), numbers[path].kind)
+                errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kind)
+        shifted = {path: replace(numbers[path], error=error.path) for path, error in errors.items()}
+        return (*{**numbers, **shifted}.values(), *errors.values())
 
     @cached_property
     def parameter_names(self) -> ParameterNames:

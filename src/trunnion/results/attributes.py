@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "EVERYWHERE", "KEPT", "MORE_THAN", "NUMERICAL", "Figure", "Scales", "attribute", "cited", "codes", "encoded",
-    "extreme_place", "finding_rows", "findings_of", "origin", "powers_of", "scales_in", "summary_of", "units_of",
-    "whole",
+    "extreme_place", "finding_rows", "findings_of", "origin", "plain", "powers_of", "scales_in", "summary_of",
+    "units_of", "whole",
 ]  # fmt: skip
 
 _AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
@@ -125,17 +125,16 @@ def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings for JSON."""
     keys = ("severity", "where", "what", "remedy", "code")
     return [
-        {key: str(getattr(finding, key)) for key in keys} | {"figures": _written(finding.figures)}
-        for finding in findings
+        {key: str(getattr(finding, key)) for key in keys} | {"figures": plain(finding.figures)} for finding in findings
     ]
 
 
-def _written(value: Any) -> Any:
-    """A figure as JSON can hold it: no number of NumPy, and none that is not finite."""
+def plain(value: Any) -> Any:
+    """Figures or nested lists as JSON can hold them: no number of NumPy, and null for one that is not finite."""
     if isinstance(value, Mapping):
-        return {key: _written(part) for key, part in value.items()}
+        return {key: plain(part) for key, part in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_written(part) for part in value]
+        return [plain(part) for part in value]
     value = value.item() if hasattr(value, "item") else value
     return None if isinstance(value, float) and not isfinite(value) else value
 
@@ -169,11 +168,6 @@ def findings_of(result: Described) -> list[Finding]:
         )
         for row in attribute(result, "findings")
     ]  # fmt: skip
-
-
-def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:
-    """The figures of a summary for JSON."""
-    return [figure.row() for figure in figures]
 
 
 def summary_of(result: Described) -> list[Figure]:
@@ -226,7 +220,7 @@ class Scales(NamedTuple):
 
     def summary(self, figures: Iterable[Figure]) -> dict[str, Any]:
         """The attributes of a result with its figures: the summary, and these scales."""
-        rows = figure_rows(self.of_figures(figures))
+        rows = [figure.row() for figure in self.of_figures(figures)]
         return {"summary": rows, **{f"scale_of_{name}": size for name, size in self._asdict().items()}}
 
     def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:

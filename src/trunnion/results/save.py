@@ -10,14 +10,13 @@ from __future__ import annotations
 import csv
 import importlib.util
 import json
-import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import xarray as xr
@@ -27,7 +26,7 @@ from trunnion.files import whole
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import guarded
 from trunnion.model.units import TableUnits
-from trunnion.results.attributes import KEPT
+from trunnion.results.attributes import KEPT, plain
 from trunnion.results.dataset import Column
 from trunnion.results.tables import KINDS, in_model_units, kind_of, selected, table_of
 from trunnion.results.tables import columns as flat_columns
@@ -104,16 +103,9 @@ def _json(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> 
     data = result.to_dict()
     for section in ("coords", "data_vars"):
         for entry in data[section].values():
-            entry["data"] = _plain(entry["data"])
+            entry["data"] = plain(entry["data"])
     with path.open("w", encoding="utf-8") as file:
         json.dump(data, file, ensure_ascii=False, allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    """Nested lists with null in place of a number that is none: JSON has no NaN."""
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _xlsx(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:

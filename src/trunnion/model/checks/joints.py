@@ -104,8 +104,6 @@ def _vain(mechanism: Numbers) -> Iterator[Finding]:
             own, default = _value(mechanism.stated_joints[name], key), _value(mechanism.joint_defaults, key)
             if part in lost or _value(joint, key) in (None, "free") or (own is None and default is None):
                 continue
-            if key == "friction" and _is_off(joint.friction):
-                continue
             where = f"joint_defaults.{key}" if own is None and part != "friction" else f"joints.{name}.{key}"
             if applies:
                 used.add(where)
@@ -126,12 +124,6 @@ def _value(joint: Joint | JointDefaults, key: str) -> Any:
     if isinstance(value, Friction) and below not in ("", "law", "model"):
         return value.parameters.get(below)
     return getattr(value, below, None) if below else value
-
-
-def _is_off(friction: Friction | None) -> bool:
-    """Whether no friction is meant by a word: see `loads.unknown_name`."""
-    coefficient = friction and friction.parameters.get("coefficient")
-    return bool(coefficient and not {"off", "none"}.isdisjoint(coefficient.names))
 
 
 # ---- what a joint needs ---------------------------------------------------------------------------------------
@@ -186,7 +178,7 @@ def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
 def _lacks(joint: Joint, pair: Pair, spatial: bool, where: str) -> Iterator[Finding]:
     """What a joint lacks that something else of it needs."""
     pin, guide, contact = joint.pin, joint.guide, joint.contact
-    rubs = joint.friction is not None and (pair.turns or pair.guided) and not _is_off(joint.friction)
+    rubs = joint.friction is not None and (pair.turns or pair.guided)
     lacks = contact_lacks(joint, spatial) if rubs else ()
     no_radius, part = pair.turns and pin is not None and pin.radius is None, "guide" if pair.guided else "pin"
     seated, has = joint.seat != "free" and joint.type in PLAY_PAIRS, has_play(joint)

@@ -155,7 +155,7 @@ def loop(mechanism: Numbers) -> Iterator[Finding]:
            f"use one of {', '.join(LOOP_PAIRS)}, or state links and joints instead") for row in rows),
         *((getattr(row, freedom) is not None, f"loop.{row.joint}.{freedom}",
            f"the {freedom} of a {row.type} joint is free, not constant")
-          for row in rows for freedom in row.pair.motions),
+          for row in rows for freedom in PAIRS[row.type].motions),
     )  # fmt: skip
     for name, link in mechanism.links.items():
         ends = [joint for joint, entry in mechanism.effective_joints.items() if name in entry.links]

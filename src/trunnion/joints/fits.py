@@ -92,20 +92,20 @@ def _deviations(size: float, tolerance_class: str) -> tuple[float, float]:
     """(lower, upper), µm."""
     match = re.fullmatch(r"([A-Za-z]{1,2})([0-9]{1,2})", tolerance_class)
     letter, grade = (match[1], int(match[2])) if match else ("", 0)
-    if letter not in (HOLES if letter.isupper() else SHAFTS):
-        kind, letters = ("holes", HOLES) if tolerance_class[:1].isupper() else ("shafts", SHAFTS)
-        remedy = f"the letters of {kind} are {', '.join(letters)}"
-        raise MechanismError(Finding(f"the class '{tolerance_class[:20]}' is not in the tables", remedy=remedy))
-    if grade not in GRADES:
-        what = f"the grade of '{tolerance_class}' is not in the tables"
-        raise MechanismError(Finding(what, remedy=f"the grades are 1 to {max(GRADES)}"))
+    kind, letters = ("holes", HOLES) if tolerance_class[:1].isupper() else ("shafts", SHAFTS)
     diameter = round(size * 1e3, 9)  # mm; without the rounding of the conversion, which could pass a limit
-    if not 0 < diameter <= SIZES[-1]:
-        remedy = f"the tables cover sizes above 0 up to {SIZES[-1]} mm"
-        raise MechanismError(Finding(f"the size {diameter:g} mm is not in the tables", remedy=remedy))
-    if grade >= 14 and diameter <= 1:
-        what = f"there is no '{tolerance_class}' of {diameter:g} mm"
-        raise MechanismError(Finding(what, remedy="grades from 14 on begin above 1 mm"))
+    for missing, what, remedy in (
+        (letter not in letters, f"the class '{tolerance_class[:20]}' is not in the tables",
+         f"the letters of {kind} are {', '.join(letters)}"),
+        (grade not in GRADES, f"the grade of '{tolerance_class[:20]}' is not in the tables",
+         f"the grades are 1 to {max(GRADES)}"),
+        (not 0 < diameter <= SIZES[-1], f"the size {diameter:g} mm is not in the tables",
+         f"the tables cover sizes above 0 up to {SIZES[-1]} mm"),
+        (grade >= 14 and diameter <= 1, f"there is no '{tolerance_class[:20]}' of {diameter:g} mm",
+         "grades from 14 on begin above 1 mm"),
+    ):  # fmt: skip
+        if missing:
+            raise MechanismError(Finding(what, remedy=remedy))
     width = _entry("IT", grade, diameter, letter)
     if letter in ("js", "JS"):
         return -width / 2, width / 2

@@ -190,11 +190,9 @@ def _columns(
     try:
         text = read_text(path, f"a {noun}", MAX_BYTES, f"write {each}, such as {example}")
         lines = numbered(io.StringIO(text, newline=None))
-        if not lines:
-            raise MechanismError(Finding("has only comments", remedy=f"write {each}", line=1))
-        if len(lines) > MAX_ROWS + 1:
-            what = f"has {len(lines)} rows, a {noun} at most {MAX_ROWS}"
-            raise MechanismError(Finding(what, remedy="use fewer points, or a random subset"))
+        if not 1 <= len(lines) <= MAX_ROWS + 1:
+            what = f"has {len(lines) or 'no'} rows, a {noun} from 2 to {MAX_ROWS}"
+            raise MechanismError(Finding(what, remedy=f"write {each}; of too many points a random subset"))
         separator = separator_of(lines[0][1], "," if len(kinds) == 2 else ";")
         rows = [(number, _cells(line, separator)) for number, line in lines]
         heads, units = list[str](), [""] * len(rows[0][1])
@@ -296,28 +294,26 @@ def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:
     kind: what it should be, with its article; start_from: remedy for an empty one.
     """
     reading(path)
+    line: int | None = None
     try:
         if path.exists() and not path.is_file():
-            raise MechanismError(Finding("is not a file", remedy=f"name {kind}"))
+            raise OSError("it is not a file")
         with path.open("rb") as stream:
             raw = stream.read(limit + 1)
-        size = max(path.stat().st_size, len(raw)) / 1e6
         text = raw.decode("utf-8-sig") if len(raw) <= limit else ""
-    except MechanismError:
-        raise
     except UnicodeDecodeError as error:
+        what, remedy = f"is not UTF-8 text (byte {error.start})", "save it as UTF-8"
         line = raw.count(b"\n", 0, error.start) + 1
-        what = f"is not UTF-8 text (byte {error.start})"
-        raise MechanismError(Finding(what, remedy="save it as UTF-8", line=line)) from error
     except (OSError, ValueError) as error:
-        reason = str(getattr(error, "strerror", None) or error)
-        raise MechanismError(Finding(f"cannot be read: {reason}", remedy="check the path")) from error
-    if len(raw) > limit:
-        what = f"has {size:.1f} MB, {kind} at most {limit / 1e6:.1f} MB"
-        raise MechanismError(Finding(what, remedy=f"check that it is {kind}, or make it smaller"))
-    if not text.strip():
-        raise MechanismError(Finding("is empty", remedy=start_from, line=1))
-    return text
+        what, remedy = f"cannot be read: {getattr(error, 'strerror', None) or error}", "check the path"
+    else:
+        if text.strip():
+            return text
+        what, remedy, line = "is empty", start_from, 1
+        if len(raw) > limit:
+            what = f"has {max(path.stat().st_size, len(raw)) / 1e6:.1f} MB, {kind} at most {limit / 1e6:.1f} MB"
+            remedy, line = f"check that it is {kind}, or make it smaller", None
+    raise MechanismError(Finding(what, remedy=remedy, line=line))
 
 
 MOST_SIGNS = 200  # of a name

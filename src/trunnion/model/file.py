@@ -151,15 +151,13 @@ def entries_of(text: str, kind: str = "YAML") -> tuple[dict[str, Any], Lines]:
             deep = _DEEP_KEY.search(text)
             data = {} if deep else tomllib.loads(text)
             if deep or _depth(data) > MAX_DEPTH:
-                at = text.count("\n", 0, deep.start()) + 1 if deep else None
-                remedy = "check brackets and the dots in keys"
-                raise MechanismError(Finding("is nested too deeply", remedy=remedy, line=at))
+                raise RecursionError
             return data, {}
         root = composed(text.replace("\t", " ") if kind == "JSON" else text)  # a tab is allowed in JSON, not in YAML
     except MechanismError:
         raise
     except RecursionError:
-        raise MechanismError(Finding("is nested too deeply", remedy="check brackets")) from None
+        raise MechanismError(Finding("is nested too deeply", remedy="check brackets, and dots in keys")) from None
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError, AssertionError, ArithmeticError) as error:
         # ruamel lets some of Python's own errors pass on text that is no YAML
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
@@ -209,14 +207,14 @@ class _Parser(Parser):
         self.nesting += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
         tag = str(getattr(event, "tag", None) or "")
         if isinstance(event, AliasEvent):
-            what = f"the alias *{event.anchor} is not allowed"
-            raise MechanismError(Finding(what, remedy="write it out, or name a dimension", line=line))
-        if tag and tag not in _PLAIN_TAGS and tag != "!":  # a tag can name code
-            raise MechanismError(Finding(f"the tag {tag} is not allowed", remedy="remove the tag", line=line))
-        if self.nesting > MAX_DEPTH:
+            what, remedy = f"the alias *{event.anchor} is not allowed", "write it out, or name a dimension"
+        elif tag and tag not in _PLAIN_TAGS and tag != "!":  # a tag can name code
+            what, remedy = f"the tag {tag} is not allowed", "remove the tag"
+        elif self.nesting > MAX_DEPTH:
             what, remedy = "is nested too deeply", "check brackets and indentation"
-            raise MechanismError(Finding(what, remedy=remedy, line=line))
-        return event
+        else:
+            return event
+        raise MechanismError(Finding(what, remedy=remedy, line=line))
 
 
 class _Builder:

@@ -149,7 +149,7 @@ def pairs_table() -> str:
         lacks = contact_lacks(Joint(type=name, links=("first", "second")), spatial=True) if part else ()
         rubs = ", ".join(code(f"{part}.{size}") for size in lacks) if part else "" if not one.count else "not modelled"
         moves = MOVES.get(name) or " and ".join(one.motions)
-        driven = one.motions[0] if one.drivable else "no"
+        driven = one.motions[0] if one.one_axis else "no"
         plane = "yes" if one.planar else "no"
         play = {("planar", "spatial"): "yes", ("spatial",): "in space", (): "no"}[
             tuple(space for space, models in CLEARANCE_MODELS.items() if name in models)

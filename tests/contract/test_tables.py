@@ -72,8 +72,8 @@ def test_law_takes_arrays_and_duals(name: str) -> None:
 def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
     """What can be driven, resisted and sprung is what moves about or along one axis; its first motion is driven."""
     pair = PAIRS[name]
-    assert pair.drivable == bool(pair.motions)
-    assert pair.motions[:1] == (pair.freedoms[:1] if pair.drivable else ())
+    assert pair.one_axis == bool(pair.motions)
+    assert pair.motions[:1] == (pair.freedoms[:1] if pair.one_axis else ())
     assert not (pair.turns and pair.guided)
 
 

@@ -119,7 +119,7 @@ def test_one_finding_for_each_problem(text: str, expected: list[str], tmp_path: 
 
 def test_a_large_file_is_refused_quickly_with_the_limit(tmp_path: Path) -> None:
     started = time.process_time()
-    for count, what in ((10**6, "has 13.8 MB, a table at most 1.0 MB"), (MAX_ROWS + 2, f"a table from 2 to {MAX_ROWS}")):
+    for count, what in ((10**6, "has 13.8 MB, a table at most 1.0 MB"), (MAX_ROWS + 2, f"from 2 to {MAX_ROWS}")):
         text = "".join(f"{k},{k}\n" for k in range(count))
         (finding,) = refused(lambda text=text: MODEL.with_table("O", csv(tmp_path, text)), tmp_path)  # type: ignore[misc]
         assert what in finding

@@ -166,7 +166,7 @@ def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], ru
     joints = [
         name
         for name, joint in base.effective_joints.items()
-        if name not in base.drivers and name not in hung and PAIRS[joint.type].drivable
+        if name not in base.drivers and name not in hung and PAIRS[joint.type].one_axis
     ]
     joints.sort(key=lambda name: name not in nearby)
     best: tuple[tuple[int, int], tuple[str, ...]] | None = None

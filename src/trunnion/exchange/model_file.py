@@ -49,7 +49,7 @@ def complete(
         what = f"is taken as the part that does not move: {reason}"
         draft.note("exchange.ground", f"links.{draft.ground}", what, "state it with --ground")
     turning = {name: PAIRS[pair.type].turns for name, pair in draft.pairs.items()}
-    drivable = [name for name, pair in draft.pairs.items() if draft.ground in pair.links and PAIRS[pair.type].drivable]
+    drivable = [name for name, pair in draft.pairs.items() if draft.ground in pair.links and PAIRS[pair.type].one_axis]
     draft.drives = {name: rate for name, rate in draft.drives.items() if name in draft.pairs}
     if drive:
         draft.drives = {drive: draft.drives.get(drive, 0.0)}

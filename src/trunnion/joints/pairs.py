@@ -46,11 +46,6 @@ class Pair:
     body: str = "sleeve"
 
     @property
-    def drivable(self) -> bool:
-        """Whether one number says how far it has moved, slides of a cylindrical pair apart."""
-        return self.one_axis
-
-    @property
     def turns(self) -> bool:
         """Whether its coordinate, as drivers and loads see it, is an angle: it has a pin, else a guide."""
         return "rotation" in self.freedoms

@@ -25,9 +25,9 @@ from trunnion.groups.dyad import DyadPose
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.tolerances import check_measure
 from trunnion.model.expression import Expression
+from trunnion.model.fields import course_kind, operands
 from trunnion.model.measure_table import MEASURES, STATISTICS, MeasureKind
 from trunnion.model.measure_table import Measure as Stated
-from trunnion.model.measure_units import course_kind, operands
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.solve.backward import Backward, pose_status

@@ -14,7 +14,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import Measure, within
 from trunnion.model.checks.check import in_radians
-from trunnion.model.measure_units import place_kind
+from trunnion.model.fields import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError

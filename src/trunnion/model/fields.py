@@ -1,8 +1,10 @@
-"""The plain fields of a model file, and what follows from them without looking at a number."""
+"""The plain fields of a model file, and what follows from them without looking at a number: names, kinds."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -10,13 +12,17 @@ from pydantic import Field
 
 from trunnion.model.entry import Name, Part, ReadOnlyDict
 from trunnion.model.joint_parts import FitChoice, Joint, JointDefaults, LoopJoint, merge_joint
-from trunnion.model.measure_table import Measure
+from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.parts import Driver, Gear, Hint, Link, Load, Spring, Table
-from trunnion.model.quantity import Acceleration, AnyQuantity, nominal_dimensions
+from trunnion.model.quantity import Acceleration, AnyQuantity, Quantity, evaluation_order, nominal_dimensions
 from trunnion.model.rules import InSpace, Refers
 from trunnion.model.tolerance_parts import Correlation, Cost, Process, Variation, VariationDefaults
+from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
-__all__ = ["Fields"]
+__all__ = [
+    "FIXED_NAMES", "Fields", "course_kind", "dimension_kinds", "drive_kind", "operand_dimensions", "operands",
+    "place_kind",
+]  # fmt: skip
 
 FIXED_NAMES = ("ground", "frame")
 
@@ -137,3 +143,96 @@ class Fields(Part):
     def data(self) -> dict[str, Any]:
         """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""
         return {"trunnion": self.trunnion, **self.model_dump(mode="json", exclude_unset=True, by_alias=True)}
+
+
+# ---- what numbers of measures, places and dimensions are --------------------------------------------------------
+
+_COLUMN = re.compile(r"(?P<part>\w+)\.(?P<kind>rotation|slide|effort)|(?P<point>\w+\.\w+)\.(?P<axis>[xyz])")
+
+
+def dimension_kinds(mechanism: Fields) -> dict[str, Kind]:
+    """What each dimension measures, as far as its value tells."""
+    dimensions: dict[str, Dimension | None] = {}
+    for name in evaluation_order(mechanism.dimensions)[0]:
+        with suppress(UnitError, KeyError):  # findings of their own
+            dimensions[name] = mechanism.dimensions[name].check(dimensions, ANY)
+    return {name: _of_dimension(dimension) for name, dimension in dimensions.items() if dimension is not None}
+
+
+def _of_dimension(dimension: Dimension | None) -> Kind:
+    """The usual kind of a dimension, a number where none is known."""
+    dimension = dimension or NUMBER
+    usual, si = {kind.dimensions[0]: kind for kind in KINDS.values()}, si_unit(dimension)
+    return usual.get(dimension) or Kind("quantity", si, f"1 {si}", (dimension,))
+
+
+def drive_kind(mechanism: Fields) -> Kind:
+    """What the coordinate of the first driver measures."""
+    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
+    return KINDS["length" if joint and not joint.pair.turns else "angle"]
+
+
+def course_kind(mechanism: Fields, measure: Measure) -> Kind:
+    """What a measure is at every position; of a joint with two motions the rotation."""
+    if not measure.kind:  # a finding of its own
+        return ANY
+    if measure.kind == "expression":
+        with suppress(UnitError, KeyError):  # findings of their own
+            formula = measure.formula
+            return _of_dimension(formula.dimension(operand_dimensions(mechanism, measure)) if formula else None)
+        return ANY
+    both = MEASURES[measure.kind].quantities
+    return both[-1 if slides(mechanism, measure) else 0]
+
+
+def slides(mechanism: Fields, measure: Measure) -> bool:
+    """Whether the joint, driver, load or spring that a measure is of slides and does not turn."""
+    load = mechanism.loads.get(measure.subject)
+    if MEASURES[measure.kind].of == "load on a joint":
+        return load is None or load.resisting_torque is None
+    name: str | None = measure.subject
+    if MEASURES[measure.kind].of == "spring":
+        spring = mechanism.springs.get(measure.subject)
+        name = spring.joint if spring else None
+        if name is None:  # between two points
+            return True
+    joint = mechanism.effective_joints.get(name or "")
+    return joint is not None and not joint.pair.turns
+
+
+def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:
+    """A time if it is stated as one, else the coordinate of the first driver. dimensions: of the names in it."""
+    with suppress(UnitError, KeyError):  # findings of their own
+        if quantity.check(dimensions) in KINDS["time"].dimensions:
+            return KINDS["time"]
+    return drive_kind(mechanism)
+
+
+def operands(mechanism: Fields, measure: Measure) -> dict[str, Measure | None]:
+    """What each name in the expression of a measure stands for: a measure, None for a dimension or for nothing.
+
+    A name is that of a measure or a dimension of the model, or of a column of a result: JOINT.rotation, JOINT.slide,
+    DRIVER.effort or LINK.POINT.x.
+    """
+    names = measure.formula.names if measure.formula else ()
+    return {name: mechanism.measures.get(name) or _column(name) for name in names}
+
+
+def _column(name: str) -> Measure | None:
+    match = _COLUMN.fullmatch(name)
+    if match is None:
+        return None
+    of_point = {"point": match["point"], "axis": match["axis"]}
+    return Measure.model_validate(of_point if match["point"] else {match["kind"]: match["part"]})
+
+
+def operand_dimensions(mechanism: Fields, measure: Measure) -> dict[str, Dimension | None]:
+    """The dimension of each name in an expression, None where it is not known; KeyError for what is nothing."""
+    of_dimensions = dimension_kinds(mechanism)
+    kinds: dict[str, Dimension | None] = {}
+    for name, part in operands(mechanism, measure).items():
+        if part is None and name not in mechanism.dimensions:
+            raise KeyError(name)
+        kind = of_dimensions.get(name, ANY) if part is None else course_kind(mechanism, part)
+        kinds[name] = next(iter(kind.dimensions), None)
+    return kinds

@@ -21,9 +21,8 @@ from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED
-from trunnion.model.fields import Fields
+from trunnion.model.fields import Fields, course_kind, dimension_kinds, drive_kind, place_kind
 from trunnion.model.joint_parts import DEFAULT_LAW, Contact, Friction, Joint, Losses
-from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, place_kind
 from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import AT, Driver, Gear, Point
 from trunnion.model.quantity import Quantity, evaluation_order

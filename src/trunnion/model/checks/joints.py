@@ -35,7 +35,6 @@ from trunnion.model.rules import faults
 
 __all__ = ["joint_findings", "joint_values"]
 
-PIN_LENGTHS = ("pin.length", "pin.bearing", "pin.end_float")
 MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
 LARGE = 0.01  # of a side: a play above it is not small
 
@@ -281,7 +280,8 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
         yield from faults(
             where,
             (across <= 0, "contact", f"has a clearance of {across:g} m, and the joint is in play"),
-            *((value(key) <= 0, key, f"is {value(key):g} m, and the joint is in play") for key in PIN_LENGTHS),
+            *((value(key) <= 0, key, f"is {value(key):g} m, and the joint is in play")
+              for key in ("pin.length", "pin.bearing", "pin.end_float")),
             (value("contact.restitution") == 0 and not contact.of.rigid, "contact.restitution",
              "is 0, which is of rigid bodies alone"),
             (contact.modulus is not None and value("contact.exponent", 1.5) != 1.5, "contact.exponent",

@@ -11,7 +11,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import MOTION, PLACED, RESERVED
-from trunnion.model.measure_units import drive_kind
+from trunnion.model.fields import drive_kind
 from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import Numbers
 from trunnion.model.parts import PolarPoint
@@ -25,12 +25,11 @@ __all__ = [
 ]  # fmt: skip
 
 Values = Mapping[str, Number]
-LOOP_PAIRS = tuple(kind for kind, pair in PAIRS.items() if pair.one_axis)  # whose motion is a dual angle about one axis
+ON_ONE_AXIS = tuple(kind for kind, pair in PAIRS.items() if pair.one_axis)  # whose motion is a dual angle about it
 
 
 def driver_findings(mechanism: Numbers) -> Iterator[Finding]:
     """Whether each driver drives a joint that one number can move, by a law that fits it."""
-    drivable = ", ".join(kind for kind, pair in PAIRS.items() if pair.drivable)
     for name, driver in mechanism.drivers.items():
         where, joint = f"drivers.{name}", mechanism.effective_joints[name]
         pair, moved = joint.pair, mechanism.effective_joints[driver.moves or name]
@@ -39,11 +38,11 @@ def driver_findings(mechanism: Numbers) -> Iterator[Finding]:
         natural = driver.points is not None and driver.ends == "natural"
         yield from faults(
             where,
-            (not pair.drivable, "",
+            (not pair.one_axis, "",
              f"the joint '{name}' is {joint.type}: it {moves} and cannot be driven by one number",
-             f"drive one of {drivable}"),
+             f"drive one of {', '.join(ON_ONE_AXIS)}"),
             (driver.moves in mechanism.drivers, "moves", f"the joint '{driver.moves}' is driven itself"),
-            (pair.drivable and endless, "", f"a driven {moved.type} joint needs a range", "add range: [0 mm, 50 mm]"),
+            (pair.one_axis and endless, "", f"a driven {moved.type} joint needs a range", "add range: [0 mm, 50 mm]"),
             (driver.found and driver.law != "constant", "law",
              f"the motion law {driver.law} prescribes a coordinate that is free",
              "state speed: … (what all but `simulate` prescribe), or no motor"),
@@ -150,9 +149,9 @@ def loop(mechanism: Numbers) -> Iterator[Finding]:
         *((True, "loop", f"the joint or link '{name}' occurs in several rows") for name in again),
         (rows and fixed in mechanism.links and fixed not in links, "ground" if mechanism.ground else "loop",
          f"the fixed link '{fixed}' is not a link of the loop: {', '.join(links)}"),
-        *((row.type not in LOOP_PAIRS, f"loop.{row.joint}.type",
+        *((row.type not in ON_ONE_AXIS, f"loop.{row.joint}.type",
            f"a {row.type} joint has no place in the table of a loop, whose joints move about one axis",
-           f"use one of {', '.join(LOOP_PAIRS)}, or state links and joints instead") for row in rows),
+           f"use one of {', '.join(ON_ONE_AXIS)}, or state links and joints instead") for row in rows),
         *((getattr(row, freedom) is not None, f"loop.{row.joint}.{freedom}",
            f"the {freedom} of a {row.type} joint is free, not constant")
           for row in rows for freedom in PAIRS[row.type].motions),

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.expression import parse
+from trunnion.model.fields import Fields, operand_dimensions, operands
 from trunnion.model.joint_parts import has_play
 from trunnion.model.measure_table import MEASURES, Measure
-from trunnion.model.measure_units import expression_findings
-from trunnion.model.names import as_key
+from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import Numbers, ParameterSet, measured
 from trunnion.model.rules import Refers, faults, limit_findings, stray
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Cost, Variation
@@ -279,7 +280,7 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
     key, kind, name = measure.kind, MEASURES[measure.kind], measure.subject
     joint = mechanism.effective_joints.get(name)
     if key == "expression":
-        yield from expression_findings(mechanism, measure, f"{where}.{key}")
+        yield from _expression_findings(mechanism, measure, f"{where}.{key}")
     elif kind.space not in ("", mechanism.space):
         yield Finding(f"there is no {key} in space", f"{where}.{key}")
     elif not isinstance(kind.of, tuple):
@@ -343,3 +344,50 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
             (first != last, "over", f"the range runs from {first} to {last}"),
             (start == end and first == last, "over", f"the range begins and ends at {start:g}", "or state at: …"),
         )  # fmt: skip
+
+
+def _expression_findings(mechanism: Fields, measure: Measure, where: str) -> Iterator[Finding]:
+    """What is wrong with the expression of a measure: its text, its names, that it speaks of itself, its units."""
+    text = measure.subject
+    try:
+        formula, parts = parse(text), operands(mechanism, measure)
+        wrong = [*_wrong_operands(mechanism, parts, where)]
+        reached: list[Measure] = []
+        for part in (left := [] if wrong else [measure]):  # it grows by what each depends on
+            others = [other for other in operands(mechanism, part).values() if other is not None]
+            left += [other for other in others if other not in reached]
+            reached += left[len(reached) + 1 :]
+        yield from wrong
+        if measure in reached:
+            yield Finding(f"'{text}' depends on itself", where, "remove the circle")
+        elif not wrong and not any(parts.values()):
+            what, remedy = f"'{text}' has no measure in it: it never changes", "name one, or a joint's rotation"
+            yield Finding(what, where, remedy)
+        elif not wrong:
+            formula.dimension(operand_dimensions(mechanism, measure))
+    except UnitError as error:
+        yield Finding(error.what, where, error.remedy)
+
+
+def _wrong_operands(mechanism: Fields, parts: Mapping[str, Measure | None], where: str) -> Iterator[Finding]:
+    """What is wrong with the names in an expression."""
+    columns = "name a measure, a dimension, JOINT.rotation, JOINT.slide, DRIVER.effort or LINK.POINT.x"
+    for name, part in parts.items():
+        dimension = name in mechanism.dimensions
+        if part is None or dimension:
+            near = columns if "." in name else nearest(name, [*mechanism.measures, *mechanism.dimensions])
+            yield from faults(
+                "",
+                (part is not None, where, f"'{name}' is a measure and a dimension", "give one of them another name"),
+                (not dimension, where, f"there is no measure or dimension '{name}'", near),
+            )
+            continue
+        kind = MEASURES.get(part.kind)
+        if kind and name not in mechanism.measures and part.subject not in mechanism.named(str(kind.of)):
+            yield Finding(f"there is no {kind.of} '{part.subject}'", where, columns)
+            continue
+        figure = part.at is not None or part.over is not None or part.statistic or part.reduced
+        deviates = kind and (kind.against or (part.kind == "angle" and part.axis is not None))
+        if not kind or figure or deviates or kind.in_time or kind.rule not in ("deviation", "ratio"):
+            what = f"the measure '{name}' is no number at every position of one mechanism"
+            yield Finding(what, where, "name measures without place, range and statistic, that are no deviation")

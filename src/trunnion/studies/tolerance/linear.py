@@ -28,7 +28,7 @@ from trunnion.measures.figures import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure, chosen, near, outputs, within
 from trunnion.measures.positions import PositionPlan, moved, place_of, plan
-from trunnion.model.measure_units import dimension_kinds
+from trunnion.model.fields import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare

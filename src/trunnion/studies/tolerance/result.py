@@ -13,7 +13,7 @@ from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
-from trunnion.model.measure_units import dimension_kinds
+from trunnion.model.fields import dimension_kinds
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System

@@ -55,6 +55,14 @@ def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(p
     assert _curve(figure, "without friction")[:-1, 1] == pytest.approx(ideal.drive_effort.values[0] / 1000)
 
 
+def test_what_locks_at_every_position_is_drawn_as_it_is_without_friction():
+    mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-10mm.yaml")
+    locked, ideal = trunnion.analyse(mechanism, 12), trunnion.analyse(mechanism.with_friction("off"), 12)
+    panels = figure_of(locked, "reactions", ideal=ideal).axes
+    labels = [[curve.get_label() for curve in axes.lines] for axes in panels]
+    assert [panel.count("without friction") for panel in labels] == [1, 1, 1]  # force, moment, load on an end
+
+
 def test_the_range_of_an_effort_where_friction_rests_is_drawn():
     result = slider()
     peak = float(np.abs(result["drive_effort"]).max())

@@ -141,8 +141,8 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         for of in (result,) if ideal is None else (result, ideal):
             for joint, vector in members(of, variable, "joint").items():
                 size = np.linalg.norm(vector, axis=0) if variable != "end_load" else larger_end(of, joint)
-                name = joint if of is result else None if lines[-1].look == FREE else "without friction"
                 look = nth(joints.index(joint)) if of is result else FREE
+                name = joint if of is result else None if lines and lines[-1].look == FREE else "without friction"
                 lines += [Line(x, size, name, look, close=True)] if size is not None else []
         if lines or variable != "end_load":
             charts.append(over_drive(result, title, unit, lines))

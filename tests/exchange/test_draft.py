@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,14 +54,16 @@ def test_the_drive_torque_does_not_depend_on_the_frame(
     np.testing.assert_allclose(abs(found), abs(expected), atol=1e-8 * np.nanmax(abs(expected)))
 
 
-def test_fixed_pairs_make_one_body_with_the_mass_of_both() -> None:
+def test_fixed_pairs_make_one_body_with_the_mass_of_both_and_the_name_of_the_ground() -> None:
     one = Body("one", 2.0, np.array([0.0, 0.0, 0.0]), np.diag([1.0, 2.0, 3.0]))
     two = Body("two", 1.0, np.array([3.0, 0.0, 0.0]), np.diag([1.0, 1.0, 1.0]))
     pairs = {
         "weld": Pair("weld", "fixed", ("one", "two"), np.zeros(3)),
+        "screws": Pair("screws", "fixed", ("bracket", "base"), np.zeros(3)),
         "A": Pair("A", "revolute", ("base", "two"), np.zeros(3)),
     }
-    draft = Draft("", {"one": one, "two": two, "base": Body("base")}, pairs, "base").welded()
+    bodies = {"one": one, "two": two, "bracket": Body("bracket"), "base": Body("base")}
+    draft = Draft("", bodies, pairs, "base").welded()
     assert list(draft.bodies) == ["one", "base"]
     assert list(draft.pairs) == ["A"]
     assert draft.pairs["A"].links == ("base", "one")
@@ -117,10 +120,20 @@ def test_a_speed_is_one_of_the_joint_that_it_drives() -> None:
         complete(draft, drive="A", speed=0.1, turns=False)
 
 
-def test_a_negative_mass_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("part", "value", "says"),
+    [
+        ("mass", -1.0, "has the mass -1 kg"),
+        ("centre", np.full(3, np.nan), "that is no number"),
+        ("at", np.array([2e9, 0, 0]), "lies 2e.09 m away"),
+        ("axis", np.zeros(3), "has no place or no axis"),
+        ("links", ("crank", "wall"), "joins 'wall', which it does not have"),
+    ],
+)
+def test_what_is_no_body_or_pair_is_refused(part: str, value: Any, says: str) -> None:
     draft = four_bar()
-    next(iter(draft.bodies.values())).mass = -1.0
-    with pytest.raises(trunnion.MechanismError, match="has the mass -1 kg"):
+    setattr(next(iter((draft.bodies if part in ("mass", "centre") else draft.pairs).values())), part, value)
+    with pytest.raises(trunnion.MechanismError, match=says):
         draft.checked()
 
 
@@ -133,10 +146,3 @@ def test_a_drive_with_limits_keeps_within_them(tmp_path: Path) -> None:
     turned = np.degrees(result["joint_rotation"].sel(joint=driven).values)
     assert (turned.min(), turned.max()) == pytest.approx((-11, 17), abs=1e-6)
     assert (result["status"].values < 3).all()
-
-
-def test_the_ground_gives_its_name_to_what_is_fixed_to_it() -> None:
-    pairs = {"weld": Pair("weld", "fixed", ("bracket", "base"), np.zeros(3))}
-    draft = Draft("", {"bracket": Body("bracket"), "base": Body("base")}, pairs, "base").welded()
-    assert list(draft.bodies) == ["base"]
-    assert draft.ground == "base"

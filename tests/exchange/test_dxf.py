@@ -132,42 +132,29 @@ def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path: Path) -
     np.testing.assert_allclose(stated.pairs["D"].at, [120 * 0.0254, 0, 0])
 
 
-def test_lines_alone_make_joints_and_say_so(tmp_path: Path) -> None:
-    lines = {layer: [mark for mark in marks if mark[0] == "line"] for layer, marks in four_bar().items()}
-    draft = read(drawing(**lines), tmp_path)
-    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(two) for two in FOUR_BAR.values()}
-    assert codes(draft).count("bare_end") == 4
-    assert all(pair.pin_radius is None for pair in draft.pairs.values())
+ON_GROUND = [("circle", A, PIN), ("line", (0, -40), (100, -40))]
+CIRCLES: list[tuple[dict[str, list[tuple[Any, ...]]], str, list[tuple[str, ...]], list[float | None]]] = [
+    # marks by layer, what is said, links of the joints and radii of their pins
+    ({layer: [mark for mark in marks if mark[0] == "line"] for layer, marks in four_bar().items()},
+     "bare_end", [*FOUR_BAR.values()], [None] * 4),
+    ({"ground": ON_GROUND, "crank": [("circle", A, 12.0)]}, "radius", [("ground", "crank")], [None]),  # too wide
+    ({"ground": ON_GROUND, "crank": [("circle", A, 5.0), ("circle", A, 5.1)]},  # which of the two?
+     "radius", [("ground", "crank")], [None]),
+    ({"ground": ON_GROUND, "crank": [("circle", (0.2, 0), 5.0)]}, "circles almost about", [], []),
+    ({"ground": ON_GROUND, "crank": [("circle", (0.2, 0), 5.0), ("line", (0.2, 0), B)]}, "circles almost", [], []),
+    ({"a": [("circle", A, HOLE), ("line", A, B)], "b": [("circle", A, PIN), ("line", A, C)],  # three on one pin
+      "c": [("circle", A, HOLE), ("line", A, D)]}, "shared_pin", [("b", "a"), ("b", "c")], [5e-3, 5e-3]),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("crank", "code", "joints"),
-    [
-        ([("circle", A, 12.0)], "radius", 1),  # too wide for a hole
-        ([("circle", A, 5.0), ("circle", A, 5.1)], "radius", 1),  # which of the two?
-        ([("circle", (0.2, 0), 5.0)], "circles almost about", 0),  # almost concentric
-        ([("circle", (0.2, 0), 5.0), ("line", (0.2, 0), B)], "circles almost about", 0),
-    ],
-)
-def test_circles_that_are_not_clearly_pin_and_hole_are_asked(
-    crank: list[tuple[Any, ...]], code: str, joints: int, tmp_path: Path
+@pytest.mark.parametrize(("marks", "says", "joints", "radii"), CIRCLES)
+def test_what_is_not_clearly_pin_and_hole_is_asked(
+    marks: dict[str, Any], says: str, joints: list[tuple[str, ...]], radii: list[float | None], tmp_path: Path
 ) -> None:
-    draft = read(drawing(ground=[("circle", A, PIN), ("line", (0, -40), (100, -40))], crank=crank), tmp_path)
-    assert code in codes(draft) or any(what.startswith(code) for what in draft.lost)
-    assert len(draft.pairs) == joints
-    assert all(pair.pin_radius is None for pair in draft.pairs.values())
-
-
-def test_three_links_on_one_pin_turn_on_that_with_the_smallest_circle(tmp_path: Path) -> None:
-    marks: dict[str, list[tuple[Any, ...]]] = {
-        "a": [("circle", A, HOLE), ("line", A, B)],
-        "b": [("circle", A, PIN), ("line", A, C)],
-        "c": [("circle", A, HOLE), ("line", A, D)],
-    }
     draft = read(drawing(**marks), tmp_path)
-    assert [pair.links for pair in draft.pairs.values()] == [("b", "a"), ("b", "c")]
-    assert "shared_pin" in codes(draft)
-    assert [pair.pin_radius for pair in draft.pairs.values()] == pytest.approx([5e-3, 5e-3])
+    assert says in codes(draft) or any(what.startswith(says) for what in draft.lost)
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(links) for links in joints}
+    assert [pair.pin_radius for pair in draft.pairs.values()] == [radius and pytest.approx(radius) for radius in radii]
 
 
 def slotted() -> dict[str, list[tuple[Any, ...]]]:

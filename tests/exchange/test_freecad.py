@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from trunnion import analyse
 from trunnion.exchange import Draft, import_file, model_text
@@ -18,37 +19,19 @@ from trunnion.model.mechanism import read_mechanism
 
 KINDS = ["Fixed", "Revolute", "Cylindrical", "Slider", "Ball", "Distance", "Parallel", "Perpendicular", "Angle",
          "RackPinion", "Screw", "Gears", "Belt"]  # fmt: skip
-UP = (0.0, 0.0, 0.0, 1.0)  # a quaternion: x, y, z, w
+UP = Rotation.identity()
 
 
-def turned(axis: Any, angle: float) -> tuple[float, ...]:
-    """The quaternion of a rotation."""
-    unit = np.asarray(axis, float) / np.linalg.norm(axis)
-    return (*(unit * math.sin(angle / 2)), math.cos(angle / 2))
+def turned(axis: Any, angle: float) -> Rotation:
+    """The rotation about an axis."""
+    return Rotation.from_rotvec(angle * np.asarray(axis, float) / np.linalg.norm(axis))
 
 
-def matrix(place: Any, q: Any) -> np.ndarray:
-    """The frame of a placement: by the columns e of q e q*."""
-    x, y, z, w = q
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+def matrix(place: Any, rotation: Rotation) -> np.ndarray:
+    """The frame of a placement."""
     frame = np.eye(4)
-    frame[:3, :3] = np.eye(3) + 2 * w * cross + 2 * cross @ cross
-    frame[:3, 3] = place
+    frame[:3, :3], frame[:3, 3] = rotation.as_matrix(), place
     return frame
-
-
-def quaternion(rotation: np.ndarray) -> tuple[float, ...]:
-    """The quaternion of a rotation matrix: the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
-    r = rotation
-    k = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] - r[1, 2]],
-            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2], r[0, 2] - r[2, 0]],
-            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
-        ]
-    )
-    return tuple(np.linalg.eigh(k)[1][:, -1])
 
 
 class Drawing:
@@ -58,18 +41,14 @@ class Drawing:
         self.objects: list[tuple[str, str, str]] = []
 
     def add(self, kind: str, name: str, **properties: str) -> str:
-        rows = "".join(
-            f'<Property name="{key}" type="App::Property">{text}</Property>' for key, text in properties.items()
-        )
+        rows = "".join(f'<Property name="{key}" type="x">{text}</Property>' for key, text in properties.items())
         self.objects.append((kind, name, f'<Properties Count="{len(properties)}">{rows}</Properties>'))
         return name
 
     def text(self) -> str:
         types = "".join(f'<Object type="{kind}" name="{name}" id="1"/>' for kind, name, _ in self.objects)
         data = "".join(f'<Object name="{name}">{rows}</Object>' for _, name, rows in self.objects)
-        head = (
-            '<?xml version="1.0" encoding="utf-8"?><Document SchemaVersion="4" ProgramVersion="1.0.0" FileVersion="1">'
-        )
+        head = '<?xml version="1.0" encoding="utf-8"?><Document SchemaVersion="4" ProgramVersion="1.0.0">'
         return f"{head}<Objects>{types}</Objects><ObjectData>{data}</ObjectData></Document>"
 
     def save(self, path: Path) -> Path:
@@ -93,10 +72,11 @@ def number(value: float) -> str:
 
 
 def placed(frame: np.ndarray) -> str:
-    (x, y, z), (a, b, c, d) = frame[:3, 3], quaternion(frame[:3, :3])
-    return f'<PropertyPlacement Px="{x!r}" Py="{y!r}" Pz="{z!r}" Q0="{a!r}" Q1="{b!r}" Q2="{c!r}" Q3="{d!r}"/>'.replace(
-        "np.float64(", ""
-    ).replace(")", "")
+    """A placement, with the quaternion as FreeCAD has it, the scalar last."""
+    keys = ("Px", "Py", "Pz", "Q0", "Q1", "Q2", "Q3")
+    numbers = [*frame[:3, 3], *Rotation.from_matrix(frame[:3, :3]).as_quat()]
+    attributes = (f'{key}="{float(number)!r}"' for key, number in zip(keys, numbers, strict=True))
+    return f"<PropertyPlacement {' '.join(attributes)}/>"
 
 
 def grouped(*names: str) -> str:
@@ -110,9 +90,7 @@ def linked(name: str, *subs: str, file: str = "") -> str:
 
 def kinds(kind: str) -> str:
     listed = "".join(f'<Enum value="{one}"/>' for one in KINDS)
-    return (
-        f'<Integer value="{KINDS.index(kind)}" CustomEnum="true"/><CustomEnumList count="13">{listed}</CustomEnumList>'
-    )
+    return f'<Integer value="{KINDS.index(kind)}"/><CustomEnumList count="13">{listed}</CustomEnumList>'
 
 
 def joint(drawing: Drawing, name: str, kind: str, ends: Any, **more: str) -> str:
@@ -164,9 +142,8 @@ def four_bar(frame: np.ndarray, frames: dict[str, np.ndarray]) -> Drawing:
     names = []
     for k, (name, bars) in enumerate(BARS.items()):
         ends = []
-        for bar, flip in zip(
-            bars, (UP, turned((1, 1, 0), math.pi) if k % 2 else turned((0, 0, 1), 0.3 * k)), strict=True
-        ):
+        flipped = turned((1, 1, 0), math.pi) if k % 2 else turned((0, 0, 1), 0.3 * k)
+        for bar, flip in zip(bars, (UP, flipped), strict=True):
             at = frame @ matrix(PINS[name], flip)
             ends.append(("Assembly", path[bar], np.linalg.inv(local[bar]) @ at))
         names.append(joint(drawing, name, "Revolute", ends))
@@ -198,7 +175,7 @@ frames = st.builds(
 @settings(max_examples=25, deadline=None)
 @given(whole=frames, own=st.tuples(frames, frames, frames, frames))
 def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory: Any, whole: np.ndarray, own: Any) -> None:
-    drawing = four_bar(whole, dict(zip(("Base", "Crank", "Rod", "Rocker"), own, strict=True)))
+    drawing = four_bar(whole, dict(zip(ALIKE, own, strict=True)))
     draft = import_file(drawing.save(tmp_path_factory.mktemp("fc") / "one.FCStd"))
     assert draft.ground == "Base"
     assert set(draft.bodies) == {"Base", "Crank", "Rod", "Rocker"}
@@ -213,9 +190,7 @@ def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory: Any, whol
 
 def test_the_model_moves_like_one_written_by_hand(tmp_path: Path) -> None:
     whole = matrix((100.0, 20.0, -40.0), turned((1, 1, 1), 2 * math.pi / 3))
-    draft = import_file(
-        four_bar(whole, dict.fromkeys(("Base", "Crank", "Rod", "Rocker"), whole)).save(tmp_path / "a.fcstd")
-    )
+    draft = import_file(four_bar(whole, dict.fromkeys(ALIKE, whole)).save(tmp_path / "a.fcstd"))
     (tmp_path / "model.yaml").write_text(model_text(draft), encoding="utf-8")
     mechanism = read_mechanism(tmp_path / "model.yaml")
     assert mechanism.space == "planar"
@@ -246,16 +221,16 @@ def test_kinds_of_joints_and_their_limits(tmp_path: Path) -> None:
     ends = {"LengthMin": number(-5.0), "LengthMax": number(20.0), "AngleMin": number(-30.0), "AngleMax": number(90.0)}
     ends |= {f"Enable{key}": boolean(True) for key in ends}
     along, round_ = matrix((0, 0, 8.0), UP), matrix((0, 0, 0), turned((0, 0, 1), math.radians(10)))
-    slider = pair_of("Slider", along, tmp_path, **ends)
-    assert slider.pairs["J"].type == "prismatic"
-    assert slider.pairs["J"].limits == pytest.approx((-0.013, 0.012))
-    pin = pair_of("Revolute", round_, tmp_path, **ends)
-    assert pin.pairs["J"].limits == pytest.approx((math.radians(-40), math.radians(80)))
-    for kind, wanted in (("Cylindrical", "cylindrical"), ("Ball", "spherical")):
-        assert pair_of(kind, round_, tmp_path).pairs["J"].type == wanted
-    fixed = pair_of("Fixed", np.eye(4), tmp_path)
-    assert set(fixed.bodies) == {"Base", "Arm"}
-    assert codes(slider) == ["lost", "drive"]
+    turns = (math.radians(-40), math.radians(80))
+    for kind, frame, type_, limits in (
+        ("Slider", along, "prismatic", (-0.013, 0.012)), ("Revolute", round_, "revolute", turns),
+        ("Cylindrical", round_, "cylindrical", None), ("Ball", round_, "spherical", None),
+    ):  # fmt: skip
+        draft = pair_of(kind, frame, tmp_path, **ends)
+        assert codes(draft) == ["lost", "drive"][: 1 + (kind != "Ball")]
+        assert draft.pairs["J"].type == type_
+        assert draft.pairs["J"].limits == (limits and pytest.approx(limits))
+    assert set(pair_of("Fixed", np.eye(4), tmp_path).bodies) == {"Base", "Arm"}
 
 
 @pytest.mark.parametrize("kind", KINDS[5:])

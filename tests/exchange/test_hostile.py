@@ -9,7 +9,6 @@ import struct
 import time
 import zipfile
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -59,6 +58,15 @@ def sound(suffix: str, folder: Path) -> Path:
     return path
 
 
+def refusal(path: Path) -> str:
+    """Why a file is not read; empty if it is."""
+    try:
+        model_text(import_file(path))
+    except MechanismError as error:
+        return str(error)
+    return ""
+
+
 @settings(deadline=None, max_examples=150)
 @given(
     suffix=st.sampled_from(sorted(SOUND)),
@@ -81,20 +89,19 @@ def test_damage_anywhere_is_no_traceback(
         at = int(share * len(data))
         data = data[:at] + inserted + data[at + lost :]
     path.write_bytes(data)
-    with suppress(MechanismError):
-        model_text(import_file(path))
+    refusal(path)
 
 
 VALUES = ("", "0", "-1", "nan", "1e308", "x", "0 0 0", "1 2 3", "world", "A", "crank", "true", "__model__", "..", "a.1")
 
 
 @settings(deadline=None, max_examples=60)
-@given(seed=st.integers(0, 2**31 - 1), suffix=st.sampled_from([".mjcf", ".sdf", ".old.sdf", ".urdf", ".FCStd", ".3mf"]))
-def test_other_values_in_xml_are_no_traceback(seed: int, suffix: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+@given(seed=st.integers(0, 2**31 - 1), suffix=st.sampled_from([".mjcf", ".sdf", ".old.sdf", ".urdf"]))
+def test_other_values_in_xml_say_what_is_wrong(
+    seed: int, suffix: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     path = sound(suffix, tmp_path_factory.mktemp("values"))
-    member = {".FCStd": "Document.xml", ".3mf": "3D/3dmodel.model"}.get(suffix)
-    text = zipfile.ZipFile(path).read(member) if member else path.read_bytes()
-    choose, root = random.Random(seed), ElementTree.fromstring(text)
+    choose, root = random.Random(seed), ElementTree.fromstring(path.read_bytes())
     for _ in range(choose.randint(1, 3)):
         element = choose.choice(list(root.iter()))
         kind = choose.randint(0, 3)
@@ -108,30 +115,8 @@ def test_other_values_in_xml_are_no_traceback(seed: int, suffix: str, tmp_path_f
             element.append(choose.choice(list(element)))
         else:
             element.text = choose.choice(VALUES)
-    changed = ElementTree.tostring(root)
-    if member:
-        with zipfile.ZipFile(path, "w") as file:
-            file.writestr(member, changed)
-    else:
-        path.write_bytes(changed)
-    with suppress(MechanismError):
-        model_text(import_file(path))
-
-
-@pytest.mark.parametrize("key", ["joints", "links"])
-@pytest.mark.parametrize("value", [None, "?", {}, float("nan"), ...])
-def test_other_values_in_json_are_no_traceback(key: str, value: object, tmp_path: Path) -> None:
-    """Everywhere in turn; ... takes the entry out."""
-    path = tmp_path / "linkage.json"
-    for k, part in ((k, part) for k, item in enumerate(FOUR_BAR[key]) for part in item):
-        changed = json.loads(json.dumps(FOUR_BAR))
-        if value is ...:
-            del changed[key][k][part]
-        else:
-            changed[key][k][part] = value
-        path.write_text(json.dumps(changed))
-        with suppress(MechanismError):
-            model_text(import_file(path))
+    path.write_bytes(ElementTree.tostring(root))
+    assert "as its format has it" not in refusal(path)  # but in words of the reader, which parses it by itself
 
 
 def points(count: int, x: bytes = b"1.0") -> bytes:

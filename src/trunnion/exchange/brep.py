@@ -158,7 +158,23 @@ class Geometry:
             start, span = ends[0], ends[1] - ends[0]
             return _gauss(lambda t: (start + np.outer(t, span), np.outer(t**0, span)), [0, 1])
         if "B_SPLINE_CURVE_WITH_KNOTS" in entity:
-            return self._spline_nodes(entity, ends, closed, same)
+            args = entity["B_SPLINE_CURVE_WITH_KNOTS"]
+            degree, poles = (entity["B_SPLINE_CURVE"] if "B_SPLINE_CURVE" in entity else args[1:])[:2]
+            repeats, knots = np.array(args[-3], dtype=int), np.array(args[-2], dtype=float)
+            weights = np.array(entity.get("RATIONAL_B_SPLINE_CURVE", [[1.0] * len(poles)])[0], dtype=float)[:, None]
+            points = np.array([self.point(pole) for pole in poles])
+            spline = BSpline(np.repeat(knots, repeats), np.hstack([points * weights, weights]), int(degree))
+            rates = spline.derivative()
+
+            def drawn(t: Array) -> tuple[Array, Array]:
+                h, dh = spline(t), rates(t)
+                place = h[:, :3] / h[:, 3:]
+                return place, (dh[:, :3] - place * dh[:, 3:]) / h[:, 3:]
+
+            breaks = np.unique(knots)[:: 1 if same else -1]
+            if not closed and np.abs(drawn(breaks[[0, -1]])[0] - ends).max() > CLOSED * np.ptp(points, axis=0).max():
+                raise UnreadError("a part of a spline")
+            return _gauss(drawn, breaks)
         if kind not in ("CIRCLE", "ELLIPSE"):
             raise UnreadError(f"a curve {kind}")
         frame, centre = self.placement(entity[kind][1])
@@ -174,27 +190,6 @@ class Geometry:
 
         pieces = max(1, math.ceil(turn / (math.pi / 4)))
         return _gauss(course, np.linspace(first, first + (turn if same else -turn), pieces + 1))
-
-    def _spline_nodes(self, entity: Any, ends: list[Array], closed: bool, same: bool) -> tuple[Array, Array]:
-        args = entity["B_SPLINE_CURVE_WITH_KNOTS"]
-        degree, poles = (entity["B_SPLINE_CURVE"] if "B_SPLINE_CURVE" in entity else args[1:])[:2]
-        repeats, knots = args[-3], args[-2]
-        weights = np.array(entity.get("RATIONAL_B_SPLINE_CURVE", [[1.0] * len(poles)])[0], dtype=float)
-        points = np.array([self.point(pole) for pole in poles])
-        spread = np.repeat(np.array(knots, dtype=float), np.array(repeats, dtype=int))
-        spline = BSpline(spread, np.column_stack([points * weights[:, None], weights]), int(degree))
-        rates = spline.derivative()
-
-        def course(t: Array) -> tuple[Array, Array]:
-            h, dh = spline(t), rates(t)
-            place = h[:, :3] / h[:, 3:]
-            return place, (dh[:, :3] - place * dh[:, 3:]) / h[:, 3:]
-
-        breaks = np.unique(knots)[:: 1 if same else -1]
-        drawn = course(breaks[[0, -1]])[0]
-        if not closed and np.abs(drawn - ends).max() > CLOSED * np.ptp(points, axis=0).max():
-            raise UnreadError("a part of a spline")
-        return _gauss(course, breaks)
 
     def loop(self, number: Any) -> list[tuple[Array, Array, Array, int, bool]]:
         """The edges of a loop in its order: nodes, tangents, ends, number and whether it runs along its edge."""

@@ -9,7 +9,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -89,11 +89,7 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
         for text, entries in groups:
             body = _body(assembly, free_name(text, draft.bodies), entries, options, draft)
             draft.bodies[body.name], parts[body.name] = body, link
-            faces[body.name] = [
-                replace(face, tolerance=tolerances.get(face.number, ""))
-                for _, solid, place in entries
-                for face in _placed(solid.faces, place)
-            ]
+            faces[body.name] = [_placed(face, place, tolerances) for _, solid, place in entries for face in solid.faces]
             if len(entries) > 1:
                 kind = "sub-assembly" if link.children else "part"
                 what = f"is a {kind} of {len(entries)} solids, taken as one rigid link"
@@ -152,20 +148,13 @@ def _body(assembly: Assembly, name: str, entries: Sequence[Entry], options: Impo
     return body
 
 
-def _placed(faces: Sequence[Face], place: Place) -> list[Face]:
-    """Faces of a part in the global frame."""
+def _placed(face: Face, place: Place, tolerances: Mapping[int, str | tuple[float, float]]) -> Face:
+    """A face of a part in the global frame, with the tolerance that the file states of it."""
     scale = abs(float(np.linalg.det(place.matrix))) ** (1 / 3)
-    return [
-        replace(
-            face,
-            frame=face.frame @ place.matrix.T / scale,
-            origin=place.at(face.origin),
-            radius=scale * face.radius,
-            area=scale**2 * face.area,
-            outline=face.outline @ place.matrix.T + place.shift,
-        )
-        for face in faces
-    ]
+    frame, outline = face.frame @ place.matrix.T / scale, face.outline @ place.matrix.T + place.shift
+    made = replace(face, frame=frame, origin=place.at(face.origin), outline=outline)
+    made.radius, made.area, made.tolerance = scale * face.radius, scale**2 * face.area, tolerances.get(face.number, "")
+    return made
 
 
 # ---- solids with free-form faces ------------------------------------------------------------------------------
@@ -200,12 +189,10 @@ def _meshed(file: Part21, solid: Solid) -> tuple[Array, str]:
                 moments_of(volume, np.array(first), np.array(second))
                 for volume, first, second in map(json.loads, done.stdout.splitlines()[-2:])
             )
-        except subprocess.TimeoutExpired:
-            return np.zeros((4, 4)), "not found: its mesh takes too long"
-        except (subprocess.CalledProcessError, ValueError):
-            return np.zeros((4, 4)), "not found: it needs the extra 'cad', or cannot be meshed"
+        except (subprocess.SubprocessError, ValueError):
+            coarse = fine = np.zeros((4, 4))
     if not fine[0, 0] > 0:
-        return np.zeros((4, 4)), "not found: its mesh encloses no volume"
+        return np.zeros((4, 4)), "not found: it needs the extra 'cad', or has no mesh within a minute"
     return fine, f"by a mesh, to about {abs(coarse[0, 0] / fine[0, 0] - 1) / 3:.1g}"
 
 
@@ -305,9 +292,9 @@ def write(positions: Positions, path: Path) -> list[Finding]:
         place = Place(positions.rotations[name][0], positions.origins[name][0])
         origin = text.placement(Place())
         drawn = text.placement(place)
-        items = [origin, *_wires(text, draft, body, place.inverse, size)]
+        wires = _wires(text, draft, body, place.inverse, size)
         kind = "GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION"
-        parts.append((name, *text.product(name, items, kind, context), origin, drawn))
+        parts.append((name, *text.product(name, [origin, wires], kind, context), origin, drawn))
     placements = [drawn for *_, drawn in parts]
     root = text.product(draft.name or "mechanism", placements, "SHAPE_REPRESENTATION", context)
     for name, definition, representation, origin, drawn in parts:
@@ -328,15 +315,13 @@ def _relation(first: int, second: int, operator: int) -> str:
     )
 
 
-def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) -> list[int]:
+def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) -> int:
     """A link as its points, the lines between them and the axes of its joints, in its own frame."""
     places = {pair.name: pair.element(body.name)[0] for pair in draft.pairs_of(body.name)} | body.points
     local = {name: inside.at(place) for name, place in places.items()}
     points = [text(f"CARTESIAN_POINT({quoted(name)},({_reals(1e3 * place)}))") for name, place in local.items()]
-    lines = [(f"{a}-{b}", local[a], local[b]) for a, b in pairwise(local)]
-    if len(local) > 2:
-        first, *_, last = local
-        lines.append((f"{last}-{first}", local[last], local[first]))
+    ring = [*local, *([next(iter(local))] if len(local) > 2 else [])]
+    lines = [(f"{a}-{b}", local[a], local[b]) for a, b in pairwise(ring)]
     for pair in draft.pairs_of(body.name):
         axis = pair.element(body.name)[1]
         half = inside.matrix @ axis / np.linalg.norm(axis) * (pair.length or SIZE * size) / 2
@@ -347,7 +332,7 @@ def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) ->
         for name, start, end in lines
         if np.linalg.norm(end - start) > 0
     ]
-    return [text(f"GEOMETRIC_CURVE_SET({quoted(body.name)},({_numbers(points + curves)}))")]
+    return text(f"GEOMETRIC_CURVE_SET({quoted(body.name)},({_numbers(points + curves)}))")
 
 
 def write_moved(positions: Positions, path: Path, original: Path) -> list[Finding]:

@@ -116,15 +116,17 @@ BAD_FILES = [
     ("trunnion: 1\n", 1, "there are no links", "state"),
     ("trunnion: 1\n3: x\n", 2, "the key '3' is unknown", "known: "),
     ("trunnion: 1\nlinks:\n", 2, "is empty", "value or remove"),
+    ("model.json", "{", 1, "is not JSON", ""), ("model.json", '{"trunnion": 1, "trunnion": 1}', 1, "given twice", ""),
+    ("model.json", "[1]", 1, "not a group of entries", ""), ("model.json", '{"trunnion": 1, "name": NaN}', 1, "", ""),
+    ("model.toml", "a = [", None, "is not TOML", ""), ("model.toml", "a = 1\na = 2\n", 2, "", ""),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("content", "line", "what", "remedy"), BAD_FILES)
-def test_files_that_are_no_model(
-    findings_of: FindingsOf, content: str | bytes, line: int | None, what: str, remedy: str
-) -> None:
+@pytest.mark.parametrize("row", BAD_FILES)
+def test_files_that_are_no_model(findings_of: FindingsOf, row: tuple[Any, ...]) -> None:
+    *name, content, line, what, remedy = row
     started = time.process_time()
-    found = findings_of(content)
+    found = findings_of(content, *name)
     assert time.process_time() - started < 3
     fitting = [one for one in found if what in one.what and remedy in one.remedy]
     assert fitting, "\n".join(map(str, found))
@@ -141,22 +143,6 @@ def test_nesting_up_to_the_limit(findings_of: FindingsOf, name: str, depth: int)
     found = findings_of(texts[name.partition(".")[2]], name)
     assert any("nested" in one.what for one in found) == (depth > MAX_DEPTH)
     assert any("'x' is unknown" in one.what for one in found) == (depth <= MAX_DEPTH)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "line", "what"),
-    [
-        ("model.json", "{", 1, "is not JSON"), ("model.json", '{"trunnion": 1, "trunnion": 1}', 1, "given twice"),
-        ("model.json", "[1]", 1, "not a group of entries"), ("model.json", '{"trunnion": 1, "name": NaN}', 1, ""),
-        ("model.toml", "a = [", None, ""), ("model.toml", "a = 1\na = 2\n", 2, ""),
-    ],
-)  # fmt: skip
-def test_json_and_toml_that_are_no_model(
-    findings_of: FindingsOf, name: str, content: str, line: Any, what: str
-) -> None:
-    found = findings_of(content, name)
-    assert what in found[0].what
-    assert line is None or found[0].line == line
 
 
 @pytest.mark.parametrize(
@@ -298,14 +284,6 @@ def test_the_shipped_schema_is_up_to_date() -> None:
     assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text(), "run python -m trunnion.model.schema"
 
 
-def test_the_schema_knows_the_tables() -> None:
-    text = json.dumps(json_schema())
-    for law, declared in FRICTION_LAWS.items():
-        assert f'"{law}"' in text
-        assert all(f'"{parameter}": ' in text for parameter in declared.parameters)
-    assert all(f'"{pair}"' in text for pair in PAIRS)
-
-
 @pytest.mark.spread(15)
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_the_examples_satisfy_the_schema(example) -> None:  # type: ignore[no-untyped-def]
@@ -317,8 +295,10 @@ def test_the_examples_satisfy_the_schema(example) -> None:  # type: ignore[no-un
     assert not validator.is_valid({**data, "links": {"a": {"points": {"A": {"axis": [1, 0]}}}}})
 
 
-def test_the_schema_has_the_limits_and_files_of_tables() -> None:
-    parts = json_schema()["$defs"]
+def test_the_schema_has_the_tables_their_limits_and_their_files() -> None:
+    parts, text = json_schema()["$defs"], json.dumps(json_schema())
+    names = {*PAIRS, *FRICTION_LAWS, *(key for law in FRICTION_LAWS.values() for key in law.parameters)}
+    assert not [name for name in names if f'"{name}"' not in text]
     assert parts["Link"]["properties"]["mass"]["minimum"] == 0
     assert parts["Driver"]["properties"]["period"]["exclusiveMinimum"] == 0
     efficiency = parts["Motor"]["properties"]["efficiency"]

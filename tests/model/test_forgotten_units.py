@@ -80,26 +80,17 @@ AXIS = "links.middle.points.C.axis"
 DOUBTS = [
     (put(LINKAGE, "BC: 90 mm", "BC: 90"), ["dimensions.BC"], "900 times the largest length with a unit, 0.1 m"),
     (put(LINKAGE, "C: [BC, 0]", "C: [90, 0]"), ["links.coupler.points.C.x"], "900 times"),
-    (put(LINKAGE, "C: [BC, 0]", "C: [2 * BC, 0]"), [], ""),
     (put(LINKAGE, "100 mm, AB: 30 mm, BC: 90 mm, CD: 70 mm", "10, AB: 3, BC: 9, CD: 7"), [], ""),  # all of them plain
     (put(LINKAGE, "AB: 30 mm, BC: 90 mm, CD: 70 mm", "AB: 30, BC: 90, CD: 70"), ["dimensions.BC"], "as are 2 others"),
-    (put(LINKAGE, "AD: 100 mm, AB: 30 mm", "AD: 100 mm, AB: 1"), ["dimensions.AB"], "10 times"),
     (put(LINKAGE, "radius: 6 mm", "radius: 6"), ["joint_defaults.pin.radius"], "60 times"),
     (put(LINKAGE, "radius: 6 mm", "radius: 60 mm"), [], ""),  # an eccentric
     (put(LINKAGE, "60 rpm", "60 rpm, range: [10, 90]"), ["drivers.A.range.from", "drivers.A.range.to"], "10 rad"),
-    (put(LINKAGE, "60 rpm", "60 rpm, start: 3"), ["drivers.A.start"], "3 rad"),
-    (
-        put(put(LINKAGE, "CD: 70 mm", "CD: 70 mm, s: 3"), "60 rpm", "60 rpm, start: 10 deg - s"),
-        ["dimensions.s"],
-        "3 rad",
-    ),
+    (put(put(LINKAGE, "70 mm}", "70 mm, s: 3}"), "60 rpm", "60 rpm, start: 10 deg - s"), ["dimensions.s"], "3 rad"),
     (LINKAGE + LIFT, ["loads.F.force.y"], "90 rad"),
     (put(SI, "speed: 60", "speed: 60, start: 3"), [], ""),
     (put(SI, "speed: 60", "speed: 60, start: 30"), ["drivers.A.start"], "4.77 turns"),
     (CLAMP, [], ""),  # a plain factor and a plain hint
-    (put(CLAMP, "range: [70 mm, 90 mm]", "range: [70 mm, 90]"), ["drivers.S.range.to"], "is 90 m, "),
     (put(CLAMP, "pinch: 1 mm", "pinch: 1"), ["dimensions.pinch"], "6 times the largest length"),
-    (put(CLAMP, "pinch: 1 mm", "pinch: 0.001"), [], ""),
     (BOUGHT, [], ""),
     (put(BOUGHT, "28 um", "28"), ["costs.B.clearance.options.g6.tolerance"], "156 times the largest length"),
     (put(BOUGHT, "limit: 1e-4", "limit: 0.2"), ["measures.end.limit"], "1.11 times"),
@@ -107,11 +98,8 @@ DOUBTS = [
     (shaft(TURNED, "  phase: 0.5\n"), ["dimensions.phase"], "28.6°"),  # a note: it is no whole number
     (shaft("[cos(3), sin(2 deg + 1), 0]"), [f"{AXIS}.x", f"{AXIS}.y"], "takes"),
     (shaft(TURNED, "  phase: 3 deg\n", "tolerances: {phase: 1}"), ["tolerances.phase"], "1 rad"),
-    (shaft(TURNED, "  phase: 3 deg\n", "errors: {phase: 1}"), ["errors.phase"], "1 rad"),
     (shaft(TURNED, "  phase: 3 deg\n"), [], ""),
-    (shaft(TURNED, "  phase: pi / 2\n"), [], ""),
     (shaft("[cos(k * pi / 4), sin(k * 45 deg), 0]", "  k: 3\n"), [], ""),
-    (shaft("[cos(side / l), sin(acos(0.3)), 0]"), [], ""),
     (put(SHAFT, "D: 0 deg", "D: 1"), ["assembly.D"], "is 1 rad"),
 ]
 

@@ -28,13 +28,9 @@ LENGTH, ANGLE, NUMBER = KINDS["length"], KINDS["angle"], KINDS["number"]
         ("30 deg", "angle", math.pi / 6), ("30°", "angle", math.pi / 6), ("180 deg", "angle", math.pi),
         ("0.152 rad", "angle", 0.152), ("pi / 2", "angle", math.pi / 2),
         ("90 deg - 0.1 deg", "angle", math.radians(89.9)), ("1500 rpm", "angular speed", 1500 * 2 * math.pi / 60),
-        ("2 rev/s", "angular speed", 4 * math.pi), ("10 rad/s", "angular speed", 10.0),
-        ("10 1/s", "angular speed", 10.0), ("10 s^-1", "angular speed", 10.0), ("600 mm/min", "speed", 0.01),
-        ("9.81 m/s^2", "acceleration", 9.81), ("9.81 m/s²", "acceleration", 9.81),
-        ("9.81 m·s⁻²", "acceleration", 9.81), ("-1 kN", "force", -1000.0), ("10 N m", "moment", 10.0),
-        ("10 N*m/rad", "moment", 10.0), ("10 N·mm", "moment", 0.01), ("48.80 kg m^2", "moment of inertia", 48.8),
-        ("48.80 kg*m**2", "moment of inertia", 48.8), ("4.8 kg", "mass", 4.8), ("450 g", "mass", 0.45),
-        ("5 %", "number", 0.05), ("5%", "number", 0.05), ("2 * (3 mm + 1 cm)", "length", 0.026),
+        ("10 1/s", "angular speed", 10.0), ("600 mm/min", "speed", 0.01), ("9.81 m·s⁻²", "acceleration", 9.81),
+        ("10 N*m/rad", "moment", 10.0), ("48.80 kg*m**2", "moment of inertia", 48.8), ("5%", "number", 0.05),
+        ("2 * (3 mm + 1 cm)", "length", 0.026),
         ("3 mm * 2^2", "length", 0.012), ("max(1 mm, 2 mm, 3 mm)", "length", 0.003),
         ("hypot(3 mm, 4 mm)", "length", 0.005), ("sqrt(16 mm^2)", "length", 0.004),
         ("atan2(1 mm, 1 mm)", "angle", math.pi / 4), ("2 m*cos(60 deg)", "length", 1.0),
@@ -185,17 +181,15 @@ def test_no_text_does_anything_but_fail_cleanly(text: str) -> None:
         assert Quantity.read(text, LENGTH).source == text
 
 
-@pytest.mark.parametrize(
-    ("text", "factor"),
-    [
-        ("daN", 10.0), ("kNm", 1e3), ("daNm", 10.0), ("cNm", 0.01), ("Nmm", 1e-3), ("N/mm^2", 1e6), ("MPa", 1e6),
-        ("m/sec", 1.0), ("Sek.", 1.0), ("Sek", 1.0), ("sec.", 1.0),
-        ("U/min", math.pi / 30), ("Umdr./min", math.pi / 30), ("cc/rev", 1e-6 / 2 / math.pi),
-    ],
-)  # fmt: skip
-def test_spellings_in_use(text: str, factor: float) -> None:
-    assert float(unit(text)[0]) == pytest.approx(factor, rel=1e-12)
-    assert dimensions(text)[0] == pytest.approx(factor, rel=1e-12)
+SPELLINGS = {
+    "daN": 10.0, "kNm": 1e3, "daNm": 10.0, "cNm": 0.01, "Nmm": 1e-3, "N/mm^2": 1e6, "MPa": 1e6, "m/sec": 1.0,
+    "Sek.": 1.0, "sec.": 1.0, "U/min": math.pi / 30, "Umdr./min": math.pi / 30, "cc/rev": 1e-6 / 2 / math.pi,
+}  # fmt: skip
+
+
+def test_spellings_in_use() -> None:
+    assert {text: float(unit(text)[0]) for text in SPELLINGS} == pytest.approx(SPELLINGS, rel=1e-12)
+    assert {text: dimensions(text)[0] for text in SPELLINGS} == pytest.approx(SPELLINGS, rel=1e-12)
 
 
 @pytest.mark.parametrize(

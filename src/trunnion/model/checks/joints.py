@@ -138,26 +138,27 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
     for name, joint in mechanism.effective_joints.items():
         where = f"joints.{name}"
         pair = joint.pair
-        if not spatial and not pair.planar:
-            flat = ", ".join(kind for kind in PAIRS if PAIRS[kind].planar)
-            yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
         if name in mechanism.joints:
             yield from _ends(mechanism, name, joint)
         yield from _lacks(joint, pair, spatial, where)
         if joint.friction is not None:
             by_default = mechanism.stated_joints[name].friction is None
             yield from _parameters_of_law(joint.friction, f"{'joint_defaults' if by_default else where}.friction")
-        if joint.seat_on is not None and joint.seat_on not in joint.links:
-            remedy = f"name {' or '.join(joint.links)}"
-            yield Finding(f"'{joint.seat_on}' is no link of this joint", f"{where}.seat_on", remedy)
         if joint.contact is not None:
             yield from _in_play(mechanism, name, pair, spatial)
         if isinstance(limits := _fit(mechanism, name), Finding):
             yield limits
         guide = joint.guide if spatial and joint.friction and pair.guided else None
-        if guide and guide.length and guide.width is None:
-            what = "without a width of the guide its torsion about the slide is carried without friction"
-            yield Finding(what, where, "state guide: {width: …} if it does not slide on a round bar", Severity.NOTE)
+        yield from faults(
+            where,
+            (not spatial and not pair.planar, "", f"a {joint.type} joint does not exist in the plane",
+             f"use one of {', '.join(kind for kind in PAIRS if PAIRS[kind].planar)}"),
+            (joint.seat_on not in (None, *joint.links), "seat_on", f"'{joint.seat_on}' is no link of this joint",
+             f"name {' or '.join(joint.links)}"),
+            (guide and guide.length and guide.width is None, "",
+             "without a width of the guide its torsion about the slide is carried without friction",
+             "state guide: {width: …} if it does not slide on a round bar", Severity.NOTE),
+        )  # fmt: skip
 
 
 def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:

@@ -346,9 +346,9 @@ def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
             (spring.joint not in mechanism.drivers and turns > 1, "free_angle",
              f"is {turns:.3g} turns, but the rotation of '{spring.joint}', which is not driven, counts none",
              "state the angle within a turn and the winding as preload: …"),
+            (values.get(f"{where}.stiffness") == 0 and preload == 0, "stiffness", "is 0: the spring does not pull",
+             "remove it", Severity.WARNING),
         )  # fmt: skip
-        if values.get(f"{where}.stiffness") == 0 and preload == 0:
-            yield Finding("is 0: the spring does not pull", f"{where}.stiffness", "remove it", Severity.WARNING)
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------
@@ -371,6 +371,6 @@ def load_findings(mechanism: Numbers) -> Iterator[Finding]:
                f"a {joint and joint.type} joint has no "
                f"{f'{freedom} to resist' if freed else 'one axis that it could act about or along'}",
                f"resist a {ONE_AXIS}, or state a force or moment on a link") for key, freedom in resists.items()),
+            (load.link == (mechanism.fixed_link or None), "", "acts on the fixed link and has no effect", "",
+             Severity.WARNING),
         )  # fmt: skip
-        if load.link is not None and load.link == mechanism.fixed_link:
-            yield Finding("acts on the fixed link and has no effect", where, "", Severity.WARNING)

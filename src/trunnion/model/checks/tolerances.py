@@ -73,9 +73,9 @@ def tolerance_names(mechanism: Varying) -> Iterator[Finding]:
              f"'{path}' is not a parameter of the mechanism"),
             (path.startswith(DEFAULTS) and path not in followed, "", f"no joint follows '{path}'"),
             (percent, "", f"the limits '{limits}' are in percent, the number is not"),
+            (path.startswith("dimensions.") and path.partition(".")[2] not in used, "",
+             f"no result depends on '{path}'", "use it, or remove it", Severity.WARNING),
         )  # fmt: skip
-        if path.startswith("dimensions.") and path.partition(".")[2] not in used:
-            yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
     for row, pair in enumerate(mechanism.correlations):
         yield from meant(mechanism, f"correlations.{row}", dict.fromkeys(pair.of))[1]
 
@@ -144,13 +144,13 @@ def _limits(mechanism: Varying, tolerance: Tolerance, variation: Variation, wher
          f"'{path}' is no angle", "only an angle is uniform over all directions"),
         (mode is not None and not lower <= mode <= upper, "mode",
          f"the mode {mode or 0:g} is outside the limits {lower:g} to {upper:g} (SI)"),
+        (abs(shift) > half, "shift",
+         f"the shift {shift:g} puts the mean outside the limits, {half:g} from their middle (SI)", "check its unit",
+         Severity.WARNING),
     )  # fmt: skip
     if cpk is not None and cpk > cp * (1 + ROUNDING):
         what = f"cpk {cpk:g} is above cp {cp:g}: the share of the limits cannot be larger off the middle than in it"
         yield Finding(what, f"{where}.cpk" if cpk_at == "tolerances" else cpk_at)
-    if abs(shift) > half:
-        what = f"the shift {shift:g} puts the mean outside the limits, {half:g} from their middle (SI)"
-        yield Finding(what, f"{where}.shift", "check its unit", Severity.WARNING)
 
 
 def _correlations(mechanism: Varying) -> Iterator[Finding]:
@@ -186,13 +186,13 @@ def cost_values(mechanism: Varying) -> Iterator[Finding]:
         where, paths = f"costs.{name}", mechanism.cost_paths(name)
         if not paths:  # neither a number with a tolerance nor a clearance
             joint = mechanism.effective_joints.get(name.removeprefix("joints.").removesuffix(".clearance"))
-            what, remedy = f"no joint follows '{name}'", "name the number of a joint"
-            findings = [] if joint and name.endswith(".clearance") else meant(mechanism, "costs", [name])[1]
             if joint and name.endswith(".clearance"):
                 derived = joint.pin is not None and (joint.pin.fit is not None or joint.pin.hole_radius is not None)
                 what = f"the joint of '{name}' states no clearance" + ": its play is that of its radii" * derived
-                remedy = "state clearance: 0.02 mm of its pin or guide"
-            yield from findings or [Finding(what, where, remedy)]
+                yield Finding(what, where, "state clearance: 0.02 mm of its pin or guide")
+            else:
+                nothing = Finding(f"no joint follows '{name}'", where, "name the number of a joint")
+                yield from meant(mechanism, "costs", [name])[1] or [nothing]
         for path in paths:
             if path in first:
                 yield Finding(f"'{name}' and '{first[path]}' are the same", where)
@@ -205,10 +205,11 @@ def cost_values(mechanism: Varying) -> Iterator[Finding]:
                 offers = []
                 faulty.append(Finding(error.findings[0].what, f"{where}.process", "state options: {…} or a model"))
             yield from faulty
-            for offer in offers:
-                if offer.least > offer.most:
-                    what = f"the least half width {offer.least:g} is above the most {offer.most:g} (SI)"
-                    yield Finding(what, f"{where}.least")
+            yield from faults(
+                where,
+                *((offer.least > offer.most, "least",
+                   f"the least half width {offer.least:g} is above the most {offer.most:g} (SI)") for offer in offers),
+            )  # fmt: skip
             if cost.group:
                 groups.setdefault(cost.group, {}).setdefault(name, []).extend(offers)
     for name, members in groups.items():
@@ -225,10 +226,10 @@ def _bought(mechanism: Varying, path: str, where: str, tolerance: Tolerance | No
         (of_play and joint and not has_play(joint), "", f"the play of a {joint and joint.type} joint is not modelled"),
         (not of_play and tolerance is None, "", f"'{path}' has no tolerance",
          f"state one as a start, tolerances: {{{as_key(path)}: ±0.05 mm}}{play}"),
+        (tolerance and not tolerance.can_be_chosen, "",
+         f"'{path}' varies as measured or over a full turn: there is no tolerance to choose", "remove the cost",
+         Severity.WARNING),
     )  # fmt: skip
-    if tolerance is not None and not tolerance.can_be_chosen:
-        what = f"'{path}' varies as measured or over a full turn: there is no tolerance to choose"
-        yield Finding(what, where, "remove the cost", Severity.WARNING)
 
 
 def _offered(cost: Cost, where: str, kind: Kind | None, path: str) -> Iterator[Finding]:

@@ -6,6 +6,7 @@ What a key of a joint takes to have an effect is a row of `_effects`; what a par
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -342,7 +343,18 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
     if not rho > 0 or joint.pair.guided:
         return
     radius, doubts = float(values.get(f"{where}.pin.radius", np.nan)), []
-    side, distance, link = _shortest_side(mechanism, name, joint, values)
+
+    def place(link: str, point: str) -> list[float]:
+        path = f"links.{link}.points.{point}"
+        return [float(values[f"{path}.{axis}"]) for axis in "xyz" if f"{path}.{axis}" in values]
+
+    # the nearest other turning joint on a link of this; joints at one point count for nothing, and a loop places none
+    sides = [(np.inf, "", "")]
+    for link, other in product(joint.links, mechanism.effective_joints):
+        mate, ends = mechanism.effective_joints[other], (place(link, name), place(link, other))
+        if other != name and link in mate.links and mate.pair.turns and all(ends):
+            sides.append((float(np.linalg.norm(np.subtract(*ends))), other, link))
+    distance, side, link = min((side for side in sides if side[0] > 0), key=lambda side: side[0])
     axes = [[values.get(f"links.{link}.points.{point}.axis.{k}", 0.0) for k in "xyz"] for point in (name, side)]
     meeting = distance <= radius and np.any(np.cross(axes[0], axes[1]) != 0)  # no lever; an eccentric's are parallel
     if rho > LARGE * distance and not meeting:
@@ -360,25 +372,6 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
             doubts.append(f"the pin is {_mm(length)} long, {guided}")
     for what in doubts:
         yield Finding(what, f"{where}.pin", "check units; a smaller play or a longer pin", Severity.WARNING)
-
-
-def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str, Number]) -> tuple[str, float, str]:
-    """The nearest other turning joint on a link of the joint, how far it is, m, and which link; infinity without one.
-
-    Joints at one point count for nothing, and a loop places none by points.
-    """
-
-    def place(link: str, point: str) -> list[float]:
-        path = f"links.{link}.points.{point}"
-        return [float(values[f"{path}.{axis}"]) for axis in "xyz" if f"{path}.{axis}" in values]
-
-    sides = [("", np.inf, "")]
-    for link in joint.links:
-        for other, other_joint in mechanism.effective_joints.items():
-            here, away = place(link, name), place(link, other)
-            if other != name and link in other_joint.links and here and away and other_joint.pair.turns:
-                sides.append((other, float(np.linalg.norm(np.subtract(here, away))), link))
-    return min((side for side in sides if side[1] > 0), key=lambda side: side[1])
 
 
 def _mm(length: float) -> str:

@@ -116,7 +116,25 @@ def tolerance_values(mechanism: Varying) -> Iterator[Finding]:
         if written and variation.limits and not np.allclose(written, (tolerance.lower, tolerance.upper), rtol=1e-9):
             what = f"these limits override those stated with '{tolerance.path}', {written[0]:g} to {written[1]:g} (SI)"
             yield Finding(what, where, "state them once", Severity.NOTE)
-    yield from _correlations(mechanism)
+    vary = {item.path for item in mechanism.tolerated()}
+    first: dict[frozenset[str], int] = {}
+    for row, item in enumerate(mechanism.correlations):
+        where, paths = f"correlations.{row}", mechanism.named_paths(item.of)
+        fixed = [name for name in item.of if not vary.issuperset(mechanism.named_paths([name]))]
+        yield from faults(
+            where,
+            *((True, "", f"'{name}' has no tolerance") for name in fixed),
+            (len(paths) < 2, "", "a correlation needs two parameters", "name two, as of: [AB, BC]"),
+        )
+        for pair in map(frozenset, combinations(paths, 2)):
+            if len(pair) < 2 or pair in first:
+                again = f"in entry {first[pair] + 1} already" if pair in first else "twice"
+                yield Finding(f"{' and '.join(sorted(pair))} is named {again}", where)
+            first.setdefault(pair, row)
+    matrix = mechanism.correlation()
+    if matrix.size and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
+        what = f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}"
+        yield Finding(f"{what}, below 0: it is not positive definite", "correlations", "reduce the coefficients")
 
 
 def _limits(mechanism: Varying, tolerance: Tolerance, variation: Variation, where: str) -> Iterator[Finding]:
@@ -151,29 +169,6 @@ def _limits(mechanism: Varying, tolerance: Tolerance, variation: Variation, wher
     if cpk is not None and cpk > cp * (1 + ROUNDING):
         what = f"cpk {cpk:g} is above cp {cp:g}: the share of the limits cannot be larger off the middle than in it"
         yield Finding(what, f"{where}.cpk" if cpk_at == "tolerances" else cpk_at)
-
-
-def _correlations(mechanism: Varying) -> Iterator[Finding]:
-    """Whether each correlation is of several tolerated numbers, once, and all of them can be at the same time."""
-    vary = {item.path for item in mechanism.tolerated()}
-    first: dict[frozenset[str], int] = {}
-    for row, item in enumerate(mechanism.correlations):
-        where, paths = f"correlations.{row}", mechanism.named_paths(item.of)
-        fixed = [name for name in item.of if not vary.issuperset(mechanism.named_paths([name]))]
-        yield from faults(
-            where,
-            *((True, "", f"'{name}' has no tolerance") for name in fixed),
-            (len(paths) < 2, "", "a correlation needs two parameters", "name two, as of: [AB, BC]"),
-        )
-        for pair in map(frozenset, combinations(paths, 2)):
-            if len(pair) < 2 or pair in first:
-                again = f"in entry {first[pair] + 1} already" if pair in first else "twice"
-                yield Finding(f"{' and '.join(sorted(pair))} is named {again}", where)
-            first.setdefault(pair, row)
-    matrix = mechanism.correlation()
-    if matrix.size and (least := float(np.linalg.eigvalsh(matrix)[0])) < -ROUNDING:
-        what = f"these correlations contradict one another: the least eigenvalue of their matrix is {least:.3g}"
-        yield Finding(f"{what}, below 0: it is not positive definite", "correlations", "reduce the coefficients")
 
 
 def cost_values(mechanism: Varying) -> Iterator[Finding]:

@@ -117,27 +117,19 @@ def _members(result: xr.Dataset, table: str) -> Iterator[Column]:
             return bool(np.any(np.isfinite(result["seat_offset"].values[(i, *index[:1])])))
         if part == "bearings":  # of joints with ends, or with a pin whose size is stated
             return bool(np.any(np.isfinite(result[variable].values[(i, *index)])))
-        return _has(kinds[i], variable, spatial)
+        pair = PAIRS[kinds[i]]
+        if "slide" in variable or variable == "friction_force":
+            return bool(pair.slides)
+        turns = {"joint_rotation_error": pair.turns or pair.angle, "reaction_moment": spatial or not pair.turns,
+                 "friction_torque": pair.turns}  # fmt: skip
+        rotation = not variable.startswith("joint_rotation") or pair.turns or not spatial
+        return bool(turns.get(variable, rotation))
 
     for dim in MEMBERS:
         stems = {name: variable.column for name, variable in VARIABLES.items()
                  if variable.dims[:1] == (dim,) and variable.column is not None
                  and table in variable.tables}  # fmt: skip
         yield from of_members(result, dim, stems, moves) if dim == "joint" else of_members(result, dim, stems)
-
-
-def _has(kind: str, variable: str, spatial: bool) -> bool:
-    """Whether a joint of a kind has a variable."""
-    pair = PAIRS[kind]
-    if variable == "joint_rotation_error":
-        return bool(pair.turns or pair.angle)
-    if "slide" in variable or variable == "friction_force":
-        return bool(pair.slides)
-    if variable == "reaction_moment":
-        return spatial or not pair.turns
-    if variable.startswith("joint_rotation"):
-        return bool(pair.turns) or not spatial
-    return variable != "friction_torque" or bool(pair.turns)
 
 
 def _locking_state(result: xr.Dataset) -> list[Column]:

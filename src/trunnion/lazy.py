@@ -14,11 +14,8 @@ __all__ = ["loader"]
 def loader(package: str, places: Mapping[str, tuple[str, str]], results: Collection[str] = ()) -> Callable[[str], Any]:
     """The `__getattr__` of a package.
 
-    Parameters
-    ----------
-    package : its name.
-    places : of each public name the module, and the name there; empty for the module itself.
-    results : the names of functions that give results, which have the accessor `result.trunnion`.
+    places: of each public name the module, and the name there, empty for the module itself. results: the names of
+    functions that give results, which have the accessor `result.trunnion`.
     """
 
     def load(name: str) -> Any:

@@ -182,16 +182,9 @@ def _scalar(value: float | str, *, quoted: bool = False) -> str:
 
 
 def renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
-    """Return the entries of a model with another name for a part, in keys and in what speaks of it.
+    """The plain data of a model file, or of a part of it at the path `way`, with another name for a part of the model.
 
-    Parameters
-    ----------
-    group : dict, list or str
-        The plain data of a model file, or of a part of it at the path `way`.
-    section : str
-        That of the part: links, joints (and points of links), dimensions, loads, springs or gears.
-    old, new : str
-        Its names.
+    section: that of the part: links, joints (and points of links), dimensions, loads, springs or gears.
     """
     if isinstance(group, dict):
         of_joints = way in (("drivers",), ("assembly",)) or (way[:1] == ("links",) and way[2:] == ("points",))

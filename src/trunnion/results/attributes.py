@@ -197,17 +197,9 @@ class Scales(NamedTuple):
     force: float
 
     def floor(self, unit: str) -> float:
-        """Return what is rounding of a quantity in a unit.
+        """What is rounding of a quantity in a unit such as `N m`, `mm` or `°`, in that unit.
 
-        Parameters
-        ----------
-        unit
-            As `N m`, `mm` or `°`.
-
-        Returns
-        -------
-        float
-            In that unit; 0 where no scale is known, NaN, which nothing is below, of what is no unit of mechanics.
+        0 where no scale is known; NaN, which nothing is below, of what is no unit of mechanics.
         """
         powers, factor = _powers(unit)
         with np.errstate(all="ignore"):  # of nothing at rest, and of rates of 1e160 1/s
@@ -252,21 +244,9 @@ def _powers(unit: str) -> tuple[tuple[float, float, float], float]:
 
 
 def extreme_place(course: Array, place: str, floor: float = ROUNDING) -> str:
-    """Say where a course has an extreme.
+    """Where a course (position,), NaN where it has no value, has an extreme: everywhere if it is constant to rounding.
 
-    Parameters
-    ----------
-    course
-        (position,), NaN where it has no value.
-    place
-        Of the extreme, as "at 24°".
-    floor
-        What is rounding of the course, see `Scales.floor`; if not given, of numbers without a unit.
-
-    Returns
-    -------
-    str
-        The place, or "everywhere" if the course is constant to rounding.
+    place: of the extreme, as "at 24°"; floor: what is rounding of it, see `Scales.floor`, or of numbers without a unit.
     """
     values = course[~np.isnan(course)]
     return EVERYWHERE if len(values) > 1 and np.max(values) - np.min(values) <= floor else place

@@ -71,23 +71,11 @@ def described(
     variables_of: Mapping[str, Variable],
     units: Mapping[str, str | MemberUnits] | None = None,
 ) -> dict[str, xr.Variable]:
-    """Describe arrays by their dimensions, units and long names.
+    """Arrays by name as variables with dimensions, units and long names, by what describes each; coordinates of units.
 
-    Parameters
-    ----------
-    arrays
-        By their names.
-    known
-        What describes each.
-    units
-        For each word in place of a unit, the unit. Where the members of a dimension have different ones, a variable
-        names them all and, in its attribute `units_of_each`, the coordinate that has that of each: `effort_unit` for
-        the word "effort".
-
-    Returns
-    -------
-    dict
-        The arrays as variables, and these coordinates.
+    units: for each word in place of a unit, the unit. Where the members of a dimension have different ones, a variable
+    names them all and, in its attribute `units_of_each`, the coordinate that has that of each: `effort_unit` for the
+    word "effort".
     """
     import xarray as xr
 

@@ -488,7 +488,7 @@ _DYNAMICS = (
 _STICKING = (
     Fault(
         "shares-beyond-their-end",
-        "dynamics/active_motion.py",
+        "dynamics/active_set.py",
         "if most > 1.0 + SLACK or",
         "if most > 1.5 + SLACK or",
         ("tests/reference/test_joints_that_lock.py", "-k", "blocks"),

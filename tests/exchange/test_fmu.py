@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trunnion.dynamics.continued import Continued
-from trunnion.dynamics.simulate import simulate
+from trunnion.dynamics.simulate import Continued, simulate
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model
 from trunnion.model.mechanism import Mechanism, read_mechanism

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from trunnion.algebra.space import ORIGIN
-from trunnion.dynamics.active_motion import RowMode, RowModes, settled
+from trunnion.dynamics.active_set import RowMode, RowModes, settled
 from trunnion.dynamics.bordered import least_shares
 from trunnion.dynamics.impact_motion import OPEN, STICK, strike
 from trunnion.joints.contact_loads import BearingLoad, GuideLoad, PinLoad

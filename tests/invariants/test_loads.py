@@ -407,12 +407,6 @@ def cart(**more: Any) -> Data:
     }
 
 
-@pytest.mark.parametrize(("load", "told"), [({"only": "positive"}, False), ({"only": "negative"}, True)])
-def test_a_useful_load_that_takes_no_power_is_told(load: Data, told: bool) -> None:
-    data = cart(loads={"F": {"joint": "X", "resisting_force": 5.0, "useful": True, **load}})
-    assert ("load.no_power" in [row["code"] for row in findings(analysed(data, 6))]) is told
-
-
 def test_a_spring_without_free_length_needs_no_direction() -> None:
     """Its ends meet at 0°: it pulls by k times the way between them, and turns the crank by k r² sin θ everywhere."""
     data = spring_four_bar()

@@ -11,8 +11,7 @@ from brief import brief
 from mechanisms_parts import joined
 from timed import LINEAR, mass_on_a_belt, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate, sweep
-from trunnion.dynamics.measured import figures_in_time
-from trunnion.dynamics.started import FIGURES
+from trunnion.dynamics.measured import FIGURES, figures_in_time
 from trunnion.dynamics.steady_cycle import UnsteadyError
 from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism

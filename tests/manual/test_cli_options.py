@@ -15,7 +15,7 @@ from manual.test_cli import EXAMPLES
 from trunnion.cli import app as cli
 from trunnion.cli.options import PLOT_KINDS, over, points
 from trunnion.cli.terminal import QUIET, say, show_rows
-from trunnion.cycle.vocabulary import NamedNumber, vocabulary
+from trunnion.cycle.model_measures import NamedNumber, vocabulary
 from trunnion.errors import Finding, Severity
 from trunnion.views.cycle import PLOTS
 

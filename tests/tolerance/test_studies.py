@@ -12,7 +12,6 @@ import trunnion
 from mechanisms import Array
 from toleranced import FOURBAR, fourbar, fourbar_angle, many
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.results.attributes import findings_of
 from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.linear import study
 
@@ -141,20 +140,6 @@ def test_refused_with_a_finding(name: str) -> None:
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
-def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
-    """l3 is the length of the coupler and that of the rocker: one number for two parts."""
-    data = fourbar().data()
-    data["links"]["rocker"]["points"]["C"] = ["l3", 0]
-    mechanism = Mechanism(**data)
-    for result in (trunnion.check(mechanism), trunnion.tolerance(mechanism, methods=["linear"], steps=12)):
-        said = findings_of(result) if hasattr(result, "attrs") else result.findings
-        (found,) = [one for one in said if one.code == "tolerance.shared_dimension"]
-        assert found.where == "dimensions.l3"
-        assert found.figures["links"] == ["coupler", "rocker"]
-        assert "coupler.C.x" in found.what
-        assert "rocker.C.x" in found.what
 
 
 PLAYS = ("O", "A", "P", "K")

@@ -16,7 +16,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.files import folder, whole
 
 if TYPE_CHECKING:
-    from trunnion.cycle.vocabulary import NamedMeasure, NamedNumber
+    from trunnion.cycle.model_measures import NamedMeasure, NamedNumber
 
 __all__ = ["check", "examples", "schema", "studio"]
 
@@ -68,7 +68,7 @@ def check(model: Model, assemblies: Path | None = None, list_: bool = False) -> 
 
 def _list(model: Model) -> None:
     """Print what can be set, swept and measured."""
-    from trunnion.cycle.vocabulary import vocabulary
+    from trunnion.cycle.model_measures import vocabulary
 
     mechanism = model.read()
     with model.lines():

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["bar", "console", "line", "say", "show_figures", "show_rows", "wrote"]
 
 # notes that nearly every result has: they are left to the report and to `check`
-QUIET = frozenset({"model.gravity", "samples.engine", "simulate.centred"})
+QUIET = frozenset({"model.gravity", "simulate.centred"})
 
 
 def console() -> Any:

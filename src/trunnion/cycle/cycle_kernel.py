@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses, Solve
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, followed, like, margin_rows, stacked
-from trunnion.cycle.fill import COMPARED, CONDITIONS, Arrays, allocate, cells, fill_chunk, fill_errors
+from trunnion.cycle.fill import COMPARED, CONDITIONS, Arrays, Causes, allocate, cells, fill_chunk, fill_errors
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.variables import OF_SOME_JOINTS, VARIABLES
 from trunnion.solve.backward import Backward
@@ -134,16 +133,8 @@ def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | Non
         return engine == "compiled"
     if run.seats:
         return False
-    weight = 1.0
-    if method is not None and positions * MARGIN_WEIGHT >= WORTH_COMPILING:
-        weight = _weight(run, method)
-    return positions * weight >= WORTH_COMPILING
-
-
-def _weight(run: Run, method: FrictionMethod) -> float:
-    """How many plain positions take NumPy as long as one with its locking margin."""
-    if not method.margin_up_to:
-        return 1.0
+    if method is None or not method.margin_up_to or positions * MARGIN_WEIGHT < WORTH_COMPILING:
+        return positions >= WORTH_COMPILING
 
     def share() -> float:
         """Of the positions those without a bound on their friction that would say at once that none locks."""
@@ -153,7 +144,8 @@ def _weight(run: Run, method: FrictionMethod) -> float:
             shares = [np.mean(np.asarray(problem.bound()) * method.margin_up_to >= 1.0) for problem in problems]
         return float(max(shares, default=0.0))
 
-    return 1.0 + MARGIN_WEIGHT * run.once(("margins followed", method), share)
+    weight = 1.0 + MARGIN_WEIGHT * run.once(("margins followed", method), share)
+    return positions * weight >= WORTH_COMPILING
 
 
 @dataclass

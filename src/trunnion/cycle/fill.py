@@ -1,22 +1,22 @@
 """What a walk comes to, as the arrays of a result have it: every number of every variable by its place, in the plane
-and in space, what errors change, and NaN where a status rules a number out."""
+and in space, what errors change, NaN where a status rules a number out, and why positions have no answer."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from trunnion.algebra import plane
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import moment_at, quaternion
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import cross, dot, plus, scaled
-from trunnion.cycle.causes import Causes
 from trunnion.errors import Status
+from trunnion.groups.dyad import DyadPose
 from trunnion.joints.clearance import describing
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
@@ -28,11 +28,11 @@ from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.seating import loads_of
 from trunnion.solve.shifts import GivenSeat, seats
-from trunnion.solve.system import System, Values
+from trunnion.solve.system import Positions, System, Values, sticking
 
 __all__ = [
-    "COMPARED", "CONDITIONS", "Arrays", "Cell", "allocate", "blank", "cells", "fill_chunk", "fill_errors", "labels",
-    "pin_area", "unwrap",
+    "COMPARED", "CONDITIONS", "Arrays", "Causes", "Cell", "allocate", "blank", "cells", "fill_chunk", "fill_errors",
+    "labels", "pin_area", "unwrap",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -272,7 +272,21 @@ def _seats(back: Backward) -> Iterator[Cell]:
         i = joints.index(seat.joint)
         ends = _ends(seat, seat.play.model.offsets(walk.values, f"seats.{seat.joint}") or [])
         loads = _ends(seat, loads_of(back, seat), shared=True)
-        contacts = _contacts(walk, seat, ends)
+        # B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis
+        gap, model = clearance(seat.joint, walk.values), seat.play.model
+        radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (gap if gap is not None else 0.0)
+        guide, ball = model.size is not None and model.size[0] == "guide", len(model.ends[0]) == 3
+        half = 0.5 * seat.play.length if model.size is not None else 0.0
+        contacts: dict[int, Vector] = {}
+        for end, offset in ends.items():
+            x, y, z = offset if ball else (offset[0], offset[1], 0.0)
+            size = np.sqrt(x * x + y * y + z * z)
+            share = np.where(size > 0, radius / np.where(size > 0, size, 1.0), np.nan)
+            along = half if end else -half
+            local: Vector = (share * x, share * y, share * z if ball else along)
+            if guide:
+                local = (0.0, 0.0, along) if isinstance(walk, SpatialWalk) else (along, 0.0, 0.0)
+            contacts[end] = walk.algebra.point_of(walk.hole(seat.joint), local[: len(walk.system.axes)])
         for name, vectors in (("seat_offset", ends), ("end_force", loads), ("contact_position", contacts)):
             for end, vector in vectors.items():
                 yield from _vector(name, (i, end), vector[:axes])
@@ -305,26 +319,6 @@ def _direction(walk: Forward, i: int, seat: GivenSeat, ends: Mapping[int, Vector
     if walk.system.turns(seat.joint):
         first_frame, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
         yield "seat_xi_pin", (i,), wrapped(xi + walk.coordinate(seat.joint, first_frame, two))
-
-
-def _contacts(walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> dict[int, Vector]:
-    """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
-    gap, model = clearance(seat.joint, walk.values), seat.play.model
-    radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (gap if gap is not None else 0.0)
-    guide = model.size is not None and model.size[0] == "guide"
-    half = 0.5 * seat.play.length if model.size is not None else 0.0
-    places: dict[int, Vector] = {}
-    for end, offset in ends.items():
-        x, y, z = offset if len(model.ends[0]) == 3 else (offset[0], offset[1], 0.0)
-        size = np.sqrt(x * x + y * y + z * z)
-        share = np.where(size > 0, radius / np.where(size > 0, size, 1.0), np.nan)
-        along = half if end else -half
-        if guide:
-            local = (0.0, 0.0, along) if isinstance(walk, SpatialWalk) else (along, 0.0, 0.0)
-        else:
-            local = (share * x, share * y, share * z if len(model.ends[0]) == 3 else along)
-        places[end] = walk.algebra.point_of(walk.hole(seat.joint), local[: len(walk.system.axes)])
-    return places
 
 
 def wrapped(angle: Number) -> Number:
@@ -364,6 +358,99 @@ def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> 
     size = np.sqrt(np.sum(vector**2, axis=0))
     share = np.where(size > 0, 2 * np.arctan2(size, sign * scalar) / np.where(size > 0, size, 1.0), 2.0)
     return np.asarray(sign * share * vector)
+
+
+# ---- why positions have no answer --------------------------------------------------------------------------------
+
+
+class Causes:
+    """Places without an answer by kind of cause, and by module, joint or path.
+
+    open: by number of the module and texts of possible reasons, with the length, m, by which each of these holds there;
+    locked: by number of the module, with the share of the friction at which it does; singular: by number of the module;
+    undefined: by path of a load or spring; rest: by joint, its relative speed is zero; stuck: only the travel of seats
+    decides the sense of a friction.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self._notes: dict[tuple[str, Any], list[tuple[Positions, Array]]] = {}
+
+    def of(self, kind: str) -> dict[Any, tuple[Positions, Array]]:
+        """Places and numbers, (…, place), of one kind."""
+        return {
+            key: (np.concatenate([places for places, _ in notes]), np.concatenate([part for _, part in notes], -1))
+            for (what, key), notes in self._notes.items() if what == kind
+        }  # fmt: skip
+
+    def keep(self, kind: str, key: Hashable, where: ArrayLike, places: Positions, numbers: ArrayLike = 0.0) -> None:
+        """Keep those of some places at which there is a cause. numbers: (…, place)."""
+        lanes = np.flatnonzero(np.broadcast_to(where, places.shape))
+        if len(lanes):
+            numbers = np.asarray(numbers, float)
+            every = np.broadcast_to(numbers, (*numbers.shape[:-1], len(places)))
+            self._notes.setdefault((kind, key), []).append((places[lanes], every[..., lanes]))
+
+    def note(self, back: Backward, status: NDArray[np.int8], places: Positions) -> None:
+        """Look at some positions, by their numbers in the cycle."""
+        for name in sticking(self.system):
+            self.keep("rest", name, back.resting[name] & (status < Status.NOT_CONVERGED), places)
+        if not np.any(status >= Status.LOCKED):
+            return
+        for path, where in back.undefined.items():
+            self.keep("undefined", path, where & (status == Status.LOAD_UNDEFINED), places)
+        modules = reversed(range(len(back.settled)))  # settled from the last module to the first
+        for number, settled in zip(modules, back.settled, strict=True):
+            locked = (np.asarray(settled.share) < 1.0) & (status == Status.LOCKED)
+            self.keep("locked", number, locked, places, settled.share)
+        if np.any(status == Status.SINGULAR):
+            walk = back.walk
+            conditions = [
+                np.broadcast_to(np.nan_to_num(group.condition(pose), nan=np.inf), status.shape)
+                for group, pose in zip(walk.system.groups, walk.poses, strict=True)
+            ]
+            worst = np.argmax(conditions, axis=0)
+            for number in range(len(conditions)):
+                self.keep("singular", number, (status == Status.SINGULAR) & (worst == number), places)
+        left = status == Status.NOT_ASSEMBLED
+        for number, pose in enumerate(back.walk.poses):  # the first module that does not close, and by how much
+            if not np.any(left):
+                break
+            bad = np.zeros(status.shape, bool)
+            for frame in pose.frames:
+                bad |= ~np.isfinite(np.broadcast_to(_sum(frame), status.shape))
+            if np.any(bad & left):
+                reasons = _shortfalls(back.walk, number)
+                sizes = np.array([np.broadcast_to(size, status.shape) for size in reasons.values()])
+                self.keep("open", (number, *reasons), bad & left, places, sizes.reshape(len(reasons), len(places)))
+            left = left & ~bad
+
+
+def _sum(frame: Any) -> Number:
+    """A number that is finite where every number of a frame is: of a planar one (x, y, c, s), of one of vectors."""
+    return sum(_sum(part) if isinstance(part, tuple) else part for part in frame)
+
+
+def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
+    """Why a closed form has no position: each reason with the length by which it holds where it is positive."""
+    module, pose = walk.system.plan.modules[number], walk.poses[number]
+    if not isinstance(pose, DyadPose):
+        return {}
+    b, c, d = module.joints
+    if module.kind == "RRR":
+        (pin_b, b_i), (c_i, c_j), (pin_d, d_j) = walk.pairs(walk.system.places[number])
+        gap, bc, cd = (
+            np.hypot(two.x - first.x, two.y - first.y) for first, two in ((pin_b, pin_d), (b_i, c_i), (c_j, d_j))
+        )
+        return {
+            f"|{b}{d}| exceeds {b}{c} + {c}{d}": gap - (bc + cd),
+            f"|{b}{d}| falls short of |{b}{c} − {c}{d}|": np.abs(bc - cd) - gap,
+        }
+    if module.kind == "RRP":
+        return {f"the path of {c} is farther from {b} than |{b}{c}|": np.abs(pose.lost) - pose.scale}
+    if module.kind == "RPR":
+        return {f"|{b}{d}| falls short of the offset of the slide {c}": np.abs(pose.lost) - pose.scale}
+    return {}
 
 
 # ---- all of a walk --------------------------------------------------------------------------------------------------

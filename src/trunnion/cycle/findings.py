@@ -7,7 +7,7 @@ positions without an answer are those of the positions (`causes`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,32 +15,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.dual import primal, single
-from trunnion.cycle.course import CycleCourse, Means, course_of
+from trunnion.algebra.dual import primal
+from trunnion.cycle.course import CycleCourse, Means
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, Severity, Status, agreeing
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS
 from trunnion.results.quantities import between, readable
 from trunnion.solve import loads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import margin_in
-from trunnion.solve.seating import NO_LOAD, UNSETTLED, EndLoads, Seating, seating_of
+from trunnion.solve.seating import NO_LOAD, UNSETTLED, EndLoads, seating_of
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed", "of_run", "shared_dimensions"]
+__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed", "of_run"]
 
 Array = NDArray[np.float64]
-ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 CLASS_TWO = 2
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
@@ -133,15 +129,6 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         what = f"gravity is not stated and taken as zero, although {', '.join(heavy)} have mass"
         remedy = f"state gravity: {down}, or gravity: {none}"
         notes.append(Finding.note("model.gravity", "gravity", what, remedy, links=heavy))
-    if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
-        what = "has no effect: no link has a mass"
-        remedy = "state mass: … and centre: … of the links, or no gravity"
-        notes.append(Finding.note("model.no_mass", "gravity", what, remedy))
-    sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
-    points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
-    if points:
-        what = f"{', '.join(points)} have a mass but no inertia: each is a point mass at its centre"
-        notes.append(Finding.note("model.point_mass", "links", what, "state inertia: …", links=points))
     if playing:
         # no seats are taken where links are over-constrained
         redundant_joints = {name for module in system.plan.modules if module.redundant for name in module.joints}
@@ -156,38 +143,18 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     return notes
 
 
-def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
-    """Of each toleranced dimension that alone sets points of more than one link: as one they vary together, as parts do
-    not.
-
-    Where it stands beside other dimensions, as the radius of a roller between two links does, it is one part's own.
-    """
-    placed = [
-        (path, entry.depends)
-        for path, entry in mechanism.parameter_set.entries.items()
-        if path.startswith("links.") and ".points." in path
-    ]
-    for tolerance in mechanism.tolerated():
-        used = [path for path, depends in placed if depends == (tolerance.path,)]
-        links = list(dict.fromkeys(path.split(".")[1] for path in used))
-        if tolerance.path.startswith("dimensions.") and len(links) > 1:
-            name = tolerance.path.removeprefix("dimensions.")
-            names = [path.removeprefix("links.").replace(".points.", ".") for path in used]
-            more = f" and {len(names) - MOST_PLACES} more" if len(names) > MOST_PLACES else ""
-            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(names[:MOST_PLACES])}{more}): these "
-            what += "links deviate together, by the same amount"
-            remedy = "if the links are made separately, give each a dimension of its own with its own tolerance"
-            yield Finding.note("tolerance.shared_dimension", tolerance.path, what, remedy, name=name, links=links)
-
-
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
 
 
 def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
     """Modules that do not close, and by how much."""
     dial, system = cycle.at.dial, cycle.run.system
+    moving = [name for name, driver in cycle.mechanism.drivers.items() if driver.moves]
     for (number, *reasons), (places, sizes) in sorted(cycle.at.causes.of("open").items(), key=lambda item: item[0][0]):
         module, at = system.plan.modules[number], dial.intervals(places)
+        drives = {name: system.drive(cycle.run.values, name, cycle.at.time[places]) for name in moving}
+        # a driver that cannot move another joint to there has a rate, and no coordinate
+        past = (name for name, (at_, rate, _) in drives.items() if np.all(np.isnan(at_) & np.isfinite(rate)))
         everywhere, where = len(places) == len(dial.values) > 1, f"links {', '.join(module.links)}"
         nowhere = f"cannot be assembled {'at any position' if everywhere else at}"
         remedy = "change the lengths or the range of the driver"
@@ -196,7 +163,7 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
             by = "; ".join(f"{name} by up to {readable(size, 'm')}" for name, size in gaps.items())
             what = f"{nowhere}: {by or 'an earlier group has no position'}"
             yield Finding.error("assembly.gap", where, what, remedy, at=at, gaps=gaps)
-        elif (driver := _past_dead_centre(cycle, places)) and system.inverse:
+        elif system.inverse and (driver := next(past, None)):
             what = f"has no position {at}: {system.inverse.moves[driver]} is past a dead centre of {driver}, which "
             what += "cannot move it on from there"
             remedy = "end the motion before it"
@@ -207,16 +174,6 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
                 why = "these links are over-constrained and close with special dimensions only"
                 remedy = "see `trunnion assemble` for the play that they need, or use joints with more freedoms"
             yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, at=at)
-
-
-def _past_dead_centre(cycle: Cycle, places: NDArray[np.intp]) -> str | None:
-    """The driver that cannot move another joint to some positions; None where there is another cause."""
-    system, time = cycle.run.system, cycle.at.time[places]
-    for name in (name for name, driver in system.mechanism.drivers.items() if driver.moves):
-        coordinate, rate, _ = system.drive(cycle.run.values, name, time)
-        if np.all(np.isnan(coordinate) & np.isfinite(rate)):
-            return name
-    return None
 
 
 def _without_answer(cycle: Cycle) -> Iterator[Finding]:
@@ -417,36 +374,6 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
             yield Finding.warning("spring.never_acts", where, what, free=free, nearest=nearest)
 
 
-def _slack(cycle: Cycle) -> Iterator[Finding]:
-    """Ropes and chains whose force turns round: which way they pull is not stated, but a rope pulls one way alone."""
-    ropes = [name for name, gear in cycle.mechanism.gears.items() if gear.radius is not None and not gear.teeth]
-    if not ropes or cycle.course is None:
-        return
-    course = course_of(cycle.run, replace(cycle.at.method, margin_up_to=0.0), names=("gear_torque",))
-    for name in ropes:
-        row, key = list(cycle.mechanism.gears).index(name), f"gears.{name}.radius"
-        ends = [course.extreme("gear_torque", row, sign=sign, unit="N m") for sign in (-1.0, 1.0)]
-        low, high = (0.0 if top is None else top.value / abs(single(cycle.run.values[key])) for top in ends)
-        if not low < -scales_of(cycle.run).floor("N") or not high > scales_of(cycle.run).floor("N"):
-            continue
-        places = " and ".join(course.told(top) for top in ends if top is not None)
-        what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; a rope goes slack where it "
-        remedy = "a closed chain or belt bears both ways; a rope needs a load or a speed that keep it taut"
-        yield Finding.note("gears.slack", f"gears.{name}", f"{what}would push", remedy, lower=low, upper=high)
-
-
-def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
-    """Useful loads that take no power anywhere; where there is no answer, that is why."""
-    marked = [name for name, load in cycle.mechanism.loads.items() if load.useful]
-    course = cycle.course
-    useful = cycle.at.arrays["useful_power"] if course is None else course.picked("useful_power").coefficients
-    if marked and np.all(np.isfinite(useful)) and not np.any(useful):
-        what = f"{', '.join(marked)} {agreeing(len(marked), 'is', 'are')} useful, but "
-        what += f"{agreeing(len(marked), 'takes', 'take')} no power at any position"
-        remedy = "check its size and where it acts, or that its joint moves in the sense of only: …"
-        yield Finding.warning("load.no_power", "loads", what, remedy, loads=marked, count=len(marked))
-
-
 def beside_the_drive(mechanism: Mechanism) -> list[str]:
     """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
     useful = useful_loads(mechanism)
@@ -546,12 +473,7 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
         remedy = "forces there are those of a pin that stays in contact"
         figures = {"part": part, "at": text, "count": len(names)}
         yield Finding.warning("contact.lifted", f"joints.{', '.join(names)}", what, remedy, **figures)
-    yield from _unsettled(cycle, seating)
-
-
-def _unsettled(cycle: Cycle, seating: Seating) -> Iterator[Finding]:
-    """Pins whose seat does not come to rest."""
-    at, joints = cycle.at, list(cycle.run.system.joints)
+    joints = list(run.system.joints)
     unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
     for i in np.flatnonzero(np.any(unsettled, axis=1)):
         intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
@@ -590,5 +512,5 @@ def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[fl
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
     _not_assembled, _without_answer, _locked, _resting, _ranges, _no_common_period, _rough, _driving_resistances,
-    _springs, _slack, _idle_loads, _uncounted_work, _lost_contacts,
+    _springs, _uncounted_work, _lost_contacts,
 )  # fmt: skip

@@ -423,12 +423,18 @@ class LockingCourse:
             close = (cut.at(middles)[0] < near) & ~np.isin(self.states_at(middles), NO_MARGIN)
             ranges = _merged(cut.edges, close.astype(int), SHORT * cut.span)
             parts += [(None, low, high) for below, low, high in ranges if below]
-        values, places = _on_dial(self.run, [end for _, *ends in parts for end in ends])
+        # ends on the dial of the drive, as accurately as they are known, and as a person reads them
+        times = [end for _, *ends in parts for end in ends]
+        dial = self.run.system.dial(self.run.values, np.array([*times, 0.0, self.run.cycle.duration]))
+        accuracy = CLOSE if dial.unit == "°" else SHARE * float(np.ptp(dial.values[-2:]))
+        digits = floor(-log10(accuracy)) if accuracy > 0 else 15
+        values = [round(float(value), digits) + 0.0 for value in dial.values[:-2]]  # so that an end at 0 is 0
+        places = [f"{value:.5g}{dial.unit}" for value in values]
+        if dial.unit == "°":
+            places = [f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".") + "°" for value in values]
         return [
-            LockingRange(
-                state, low, high, *self._least(low, high), values[2 * k : 2 * k + 2], places[2 * k : 2 * k + 2]
-            )
-            for k, (state, low, high) in enumerate(parts)
+            LockingRange(state, low, high, *self._least(low, high), values[k : k + 2], places[k : k + 2])
+            for k, (state, low, high) in zip(range(0, len(times), 2), parts, strict=True)
         ]
 
     def _least(self, low: float, high: float) -> tuple[float, str]:
@@ -587,17 +593,6 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
 def centred(run: Run, after: str = "") -> str:
     """What ranges and the way back are of: of the mechanism without play."""
     return (", pins centred" + after) * bool(run.seats)
-
-
-def _on_dial(run: Run, times: Sequence[float]) -> tuple[list[float], list[str]]:
-    """Times, s, on the dial of the drive, as accurately as they are known, and as a person reads them."""
-    dial = run.system.dial(run.values, np.array([*times, 0.0, run.cycle.duration]))
-    accuracy = CLOSE if dial.unit == "°" else SHARE * float(np.ptp(dial.values[-2:]))
-    digits = floor(-log10(accuracy)) if accuracy > 0 else 15
-    values = [round(float(value), digits) + 0.0 for value in dial.values[:-2]]  # so that an end at 0 is 0
-    if dial.unit == "°":
-        return values, [f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".") + "°" for value in values]
-    return values, [f"{value:.5g}{dial.unit}" for value in values]
 
 
 def _merged(edges: Array, codes: NDArray[np.integer], shortest: float) -> list[tuple[int, float, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -10,11 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle import resting_joints
-from trunnion.cycle.causes import Causes
+from trunnion.algebra.panels import POINTS
 from trunnion.cycle.course import CycleCourse, Means, course_of, unknown
 from trunnion.cycle.cycle_kernel import compiles, kernel_of
-from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors, labels, unwrap
+from trunnion.cycle.fill import COMPARED, Arrays, Causes, allocate, fill_chunk, fill_errors, labels, unwrap
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.arguments import strict_arguments
@@ -23,7 +22,7 @@ from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.run import CHUNK, Run, blocks
-from trunnion.solve.seating import NO_LOAD, SETTLED, UNSETTLED, EndLoads, Seating, seating_of
+from trunnion.solve.seating import NO_LOAD, SETTLED, UNSETTLED, Seating, seating_of
 from trunnion.solve.system import Dial, System
 
 __all__ = ["ALL", "Arrays", "Dtype", "Kept", "Positions", "check_steps", "positions", "stretch"]
@@ -163,13 +162,24 @@ def stretch(
     parts = [part for part, has in (("seats", run.seats), ("errors", run.erring)) if has]
     arrays, causes = allocate(run.system, steps, parts, variables), Causes(run.system)
     compiled = compiles(engine, run, steps, method) and _compiled(arrays, run, time, method, causes, engine)
+    quick, seating = replace(method, margin_up_to=0.0), seating_of(run, method) if run.seats else None
     for window in blocks(0 if compiled else steps, len(run.system.joints)):
-        _fill(arrays, run, time[window], window, method, causes)
+        seated = seating.at(time[window], method) if seating else None
+        fill_chunk(arrays, seated.back if seated else run.solve(time[window], method=method), window, causes)
+        if seating and seated:
+            causes.keep("stuck", "", seated.sticks, np.arange(window.start, window.stop))
+            arrays["seat_rounds"][window], arrays["seat_change"][window] = seated.rounds, seating.change[seated.states]
+            arrays["seat_travel"][window] = seated.states == SETTLED
+            status = arrays["status"][window]
+            np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
+        if run.erring:
+            meant = allocate(run.system, len(time[window]), wanted=COMPARED)
+            fill_chunk(meant, run.ideal.solve(time[window], method=quick), slice(None))
+            fill_errors(arrays, meant, run.system, window)
         if progress:
             progress(window.stop)
-    quick, seating = replace(method, margin_up_to=0.0), seating_of(run, method) if run.seats else None
     resting = {joint: places for joint, (places, _) in causes.of("rest").items()}
-    resting_joints.bracket(arrays, run, time, quick, resting, seating)
+    _bracket(arrays, run, time, quick, resting, seating)
     if method.margin_up_to and resting and run.cycle.duration > 0:
         places = np.unique(np.concatenate(list(resting.values())))
         solve = (lambda at: seating.at(at, method).back) if seating else (lambda at: run.solve(at, method=method))
@@ -181,23 +191,6 @@ def stretch(
     means = unknown(len(run.system.mechanism.drivers), len(run.system.joints))
     dial = run.system.dial(run.values, time)
     return Positions(arrays, names, time, dial, method, causes, means, means if run.erring else None)
-
-
-def _fill(arrays: Arrays, run: Run, time: Array, window: slice, method: FrictionMethod, causes: Causes) -> None:
-    """One chunk of positions; of a mechanism with errors beside the ideal one."""
-    seating = seating_of(run, method) if run.seats else None
-    seated = seating.at(time, method) if seating else None
-    fill_chunk(arrays, seated.back if seated else run.solve(time, method=method), window, causes)
-    if seating and seated:
-        causes.keep("stuck", "", seated.sticks, np.arange(window.start, window.stop))
-        arrays["seat_rounds"][window], arrays["seat_change"][window] = seated.rounds, seating.change[seated.states]
-        arrays["seat_travel"][window] = seated.states == SETTLED
-        status = arrays["status"][window]
-        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
-    if run.erring:
-        meant = allocate(run.system, len(time), wanted=COMPARED)
-        fill_chunk(meant, run.ideal.solve(time, method=replace(method, margin_up_to=0.0)), slice(None))
-        fill_errors(arrays, meant, run.system, window)
 
 
 def _compiled(arrays: Arrays, run: Run, time: Array, method: FrictionMethod, causes: Causes, engine: str) -> bool:
@@ -225,11 +218,24 @@ def _lose_contact(arrays: Arrays, seating: Seating, time: Array) -> None:
     round, which the courses of the loads without play say whatever the positions are; where the load of a pin that
     travels points away from its wall; and where a seat does not settle, since there the load changes more by the seat
     than it presses.
+
+    The number of each joint is |F × Ḟ|/|F|³, rad/(N s), of its reaction without play, in space of the force on an end.
+    S. W. E. Earles and C. L. S. Wu (Predicting the occurrence of contact loss and impact at a bearing from a
+    zero-clearance analysis, Proc. 4th World Congress on the Theory of Machines and Mechanisms, 1975, 1013-1018) found
+    it to tell impact from about 1 rad/(N s) on. It is empirical, and has a unit.
     """
     run, loads, status = seating.run, seating.loads, arrays["status"]
     for first in range(0, len(time), CHUNK):
         window = slice(first, min(first + CHUNK, len(time)))
-        _fill_numbers(arrays["contact_loss_number"][:, window], loads, time[window])
+        forces, rates = loads.courses.at(time[window]), loads.rates.at(time[window])
+        for number, vectors in zip(arrays["contact_loss_number"][:, window], loads.vectors, strict=True):
+            for rows in vectors:  # |F × Ḟ|/|F|³
+                force, rate = forces[rows], rates[rows]
+                square = np.sum(force * force, axis=0)
+                with np.errstate(all="ignore"):
+                    across = np.linalg.norm(rate - force * (np.sum(force * rate, axis=0) / square), axis=0)
+                    pressed = np.sqrt(square) > NO_LOAD * loads.largest
+                    number[...] = np.fmax(number, np.where(pressed, across / square, np.nan))
     joints, duration, lost = list(run.system.joints), run.cycle.duration, arrays["contact_lost"]
     step = time[1] - time[0] if len(time) > 1 else 0.0
     for halt in seating.halts:
@@ -252,19 +258,92 @@ def _lose_contact(arrays: Arrays, seating: Seating, time: Array) -> None:
     np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
 
 
-def _fill_numbers(numbers: Array, loads: EndLoads, time: Array) -> None:
-    """|F × Ḟ|/|F|³, rad/(N s), of every joint: of its reaction without play, in space of the force on an end.
+# ---- drive efforts where a joint rests -------------------------------------------------------------------------
 
-    S. W. E. Earles and C. L. S. Wu (Predicting the occurrence of contact loss and impact at a bearing from a
-    zero-clearance analysis, Proc. 4th World Congress on the Theory of Machines and Mechanisms, 1975, 1013-1018) found
-    it to tell impact from about 1 rad/(N s) on. It is empirical, and has a unit.
+LANES = 512  # positions solved at once, each with many shares
+FEW = 32  # positions: those of a joint that rests where it turns round, not throughout a dwell
+SHARES = np.concatenate([[-1.0], POINTS, [1.0]])  # of the resistance of a contact; they are close at the ends
+FLAT = 1e-9  # of the effort: where it rises by less between the ends it is followed no farther
+CLOSER, ZOOMED = 7, 18  # places between the neighbours of the highest, and how often these are narrowed
+ROUNDS = 3  # of several contacts, each by itself: they hardly depend on one another
+
+
+def _bracket(
+    arrays: dict[str, Array],
+    run: Run,
+    time: Array,
+    method: FrictionMethod,
+    resting: Mapping[str, NDArray[np.intp]],
+    seating: Seating | None,
+) -> None:
+    """Fill drive_effort_lower and drive_effort_upper: what resists a joint that rests may be anything between two ends.
+
+    The effort is no linear function of that resistance, for other joints rub the more the harder they are pressed, and
+    it bends where a guide tilts over. So its extremes are looked for between the ends, for one contact after the other;
+    of several joints that rest the separate effects are added (first order). resting: places at which a joint does;
+    seating: where pins lie, if not in the middle.
     """
-    forces, rates = loads.courses.at(time), loads.rates.at(time)
-    for number, vectors in zip(numbers, loads.vectors, strict=True):
-        for rows in vectors:
-            force, rate = forces[rows], rates[rows]
-            square = np.sum(force * force, axis=0)
-            with np.errstate(all="ignore"):
-                across = np.linalg.norm(rate - force * (np.sum(force * rate, axis=0) / square), axis=0)
-                pressed = np.sqrt(square) > NO_LOAD * loads.largest
-                number[...] = np.fmax(number, np.where(pressed, across / square, np.nan))
+    if not resting or not run.system.mechanism.drivers:
+        return  # both are the effort itself, or there is none
+    ends = {sign: arrays["drive_effort"].copy() for sign in (-1.0, 1.0)}
+    for joint, places in resting.items():
+        again = len(places) <= FEW and not seating  # a few are asked for again and again
+        for low in range(0, len(places), LANES):
+            part = places[low : low + LANES]
+            rests = _Resting(run, joint, time[part], seating.offsets(time[part]) if seating else {}, method)
+            key = ("resting", joint, rests.time.tobytes(), method)
+            for sign, change in (run.once(key, rests.changes) if again else rests.changes()).items():
+                ends[sign][:, part] += change
+    arrays["drive_effort_lower"], arrays["drive_effort_upper"] = ends.values()
+
+
+@dataclass(frozen=True)
+class _Resting:
+    """A joint at positions at which it rests, pins held in their seats."""
+
+    run: Run
+    joint: str
+    time: Array
+    offsets: Mapping[str, Array]
+    method: FrictionMethod
+
+    def efforts(self, shares: Array, lanes: NDArray[np.intp]) -> Array:
+        """(driver, share, lane) under shares of the resistance of each contact, −1 to 1, (contact, share, lane)."""
+        count, drivers = shares.shape[1], self.run.system.mechanism.drivers
+        offsets = {path: np.tile(row[lanes], count) for path, row in self.offsets.items()}
+        senses = {self.joint: tuple(shares.reshape(len(shares), -1))}
+        efforts = self.run.at(np.tile(self.time[lanes], count), offsets, self.method, senses).efforts
+        rows = [np.broadcast_to(efforts[name], count * len(lanes)) for name in drivers]
+        return np.array(rows).reshape(len(drivers), count, -1)
+
+    def changes(self) -> dict[float, Array]:
+        """By how much each effort may be less, sign −1, and more, 1, (driver, lane); NaN where it may lock."""
+        contacts, lanes = self.run.system.resting(self.joint), np.arange(len(self.time))
+        spots = np.zeros((contacts, 1 + len(SHARES), len(lanes)))
+        spots[0, 1:] = SHARES[:, None]
+        efforts = self.efforts(spots, lanes)
+        return {sign: self._change(sign, efforts[:, 0], efforts[:, 1:]) for sign in (-1.0, 1.0)}
+
+    def _change(self, sign: float, middle: Array, first: Array) -> Array:
+        """first: the efforts under shares of the first contact's resistance alone, from which its search sets out."""
+        contacts, every = self.run.system.resting(self.joint), np.arange(len(self.time))
+        most, best = np.zeros(middle.shape), np.zeros((len(middle), contacts, len(every)))
+        for driver, at_rest in enumerate(middle):
+            for contact in list(range(contacts)) * (ROUNDS if contacts > 1 else 1):
+                lanes, spots = every, np.repeat(SHARES[:, None], len(every), axis=1)
+                for round_ in range(ZOOMED):
+                    tried = np.repeat(best[driver][:, None, lanes], len(spots), axis=1)
+                    tried[contact] = spots
+                    alone = round_ == 0 and contact == 0 and not np.any(best[driver])
+                    values = sign * ((first if alone else self.efforts(tried, lanes))[driver] - at_rest[lanes])
+                    k, lane = np.argmax(values, axis=0), np.arange(len(lanes))  # of one without a value, if any
+                    better = ~(values[k, lane] <= most[driver, lanes])
+                    most[driver, lanes[better]] = values[k, lane][better]
+                    best[driver, contact, lanes[better]] = spots[k, lane][better]
+                    least = np.maximum(values[0], values[-1]) + FLAT * (np.abs(at_rest[lanes]) + np.ptp(values, axis=0))
+                    rises = values[k, lane] > least
+                    lanes, k, lane = lanes[rises], k[rises], lane[rises]
+                    if not len(lanes):
+                        break
+                    spots = np.linspace(spots[k - 1, lane], spots[k + 1, lane], CLOSER)
+        return sign * most

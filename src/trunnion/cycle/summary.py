@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
 from trunnion.algebra.dual import primal
-from trunnion.cycle.course import MOST_SUPPOSED, CycleCourse, Means, magnitude
+from trunnion.cycle.course import MOST_SUPPOSED, CycleCourse, magnitude
 from trunnion.cycle.fill import pin_area
 from trunnion.cycle.findings import Cycle, effort_units, findings
 from trunnion.cycle.locking_course import critical_figure
@@ -199,31 +199,25 @@ def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
 
 def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     """Efficiency of the cycle, with its error, and without errors of the joints."""
-    means = course.means
-    note = _meaning(means, course.status)
-    yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=note)
+    means, value, note = course.means, course.means.efficiency, ""
+    if not means.has_useful_work:
+        note = f"{NOTHING_USEFUL}: {STATE_USEFUL}"
+    elif np.isfinite(value):
+        note = "the useful loads do no net work" if value == 0 else "the useful loads supply work" * bool(value < 0)
+    elif np.any(course.status >= Status.NOT_CONVERGED):
+        note = "not every position is solved"
+    elif means.supposed > MOST_SUPPOSED:
+        note = f"pins do not settle, which may change {means.supposed:.0%} of the work"
+    elif not np.isfinite(means.drive_power.value):
+        note = "not every position between the steps is solved"
+    else:
+        drives = means.drive_power.net < 0
+        note = "the loads drive, the driver absorbs work" if drives else "the driver does no net work"
+    yield Figure("efficiency", "efficiency of the cycle", value, note=note)
     yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
     if cycle.at.ideal is not None:
         ideal = cycle.at.ideal.efficiency
         yield Figure("efficiency_ideal", "efficiency of the cycle without errors", ideal)
-
-
-def _meaning(means: Means, status: NDArray[Any]) -> str:
-    """What an efficiency of 0, or below it, or none, means. status: of the positions."""
-    value = means.efficiency
-    if not means.has_useful_work:
-        return f"{NOTHING_USEFUL}: {STATE_USEFUL}"
-    if value == 0:
-        return "the useful loads do no net work"
-    if np.isfinite(value):
-        return "the useful loads supply work" * bool(value < 0)
-    if np.any(status >= Status.NOT_CONVERGED):
-        return "not every position is solved"
-    if means.supposed > MOST_SUPPOSED:
-        return f"pins do not settle, which may change {means.supposed:.0%} of the work"
-    if not np.isfinite(means.drive_power.value):
-        return "not every position between the steps is solved"
-    return "the loads drive, the driver absorbs work" if means.drive_power.net < 0 else "the driver does no net work"
 
 
 def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:

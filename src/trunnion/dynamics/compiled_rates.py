@@ -304,15 +304,9 @@ def _affine(motion: FreeMotion, at: Moment) -> tuple[list[Number], Moment, Numbe
 
 
 def _missed(motion: FreeMotion, at: Moment, numbers: Any, active: Held = NONE) -> list[Number]:
-    """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0. numbers:
-    accelerations, then the forces of these contacts."""
-    second, forces, senses = numbers[: len(motion.names)], numbers[len(motion.names) :], motion.senses(at)
-    if active.closed:
-        at = at._replace(onsets=motion.forced(at.onsets, forces, active))
-    back, driven = motion.solve(at, second, senses, sliding=True), motion.driven(at, second, senses)
-    moved = {k: motion.contacts[k].accelerations(back.walk) for k in active.closed}
-    efforts = [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
-    return [*efforts, *(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)]
+    """See `FreeMotion.misses`. numbers: accelerations, then the forces of closed contacts."""
+    count = len(motion.names)
+    return motion.misses(at, numbers[:count], numbers[count:], active, motion.senses(at))[0]
 
 
 def _slopes(

@@ -9,7 +9,7 @@ Several places may strike at once. Impulses Λ at them change the rates of gaps 
 G = W M⁻¹ Wᵀ. At every place either nothing is exchanged and γₙ⁺ ≥ −e γₙ⁻, or γₙ⁺ = −e γₙ⁻ with an impulse Λₙ ≥ 0 and
 one along the tangent, |Λₜ| ≤ f Λₙ, that is −f Λₙ times the sign of the slip γₜ⁺: a linear complementarity problem (Ch.
 Glocker, F. Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley, 1996; without tangential restitution). Its
-cases change by the worst place first, see `active_motion.settled`.
+cases change by the worst place first, see `active_set.settled`.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import single
-from trunnion.dynamics.active_motion import MEET as SLOW
-from trunnion.dynamics.active_motion import ActiveMotion, RowMode, RowModes, settled
+from trunnion.dynamics.active_motion import ActiveMotion
+from trunnion.dynamics.active_set import MEET as SLOW
+from trunnion.dynamics.active_set import RowMode, RowModes, settled
 from trunnion.dynamics.bordered import nearest
-from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
+from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.rates import Dynamics
 from trunnion.dynamics.solution import Impact
 from trunnion.dynamics.start import Places, load_times
@@ -308,20 +309,16 @@ class ImpactMotion(ActiveMotion):
                 )
                 self._note(time, "impact", approach, "m/s", label)
         self._set({k: closed.get(k) for k in places})
-        if self.mode.senses:
-            self._torn(time, row)
+        if self.mode.senses:  # joints that stuck slide on with the speeds that it leaves them
+            senses = list(self.mode.senses)
+            for k, speed in enumerate(self.motion.ways(self.moment(time, row))[1]):
+                if abs(speed) > SLOW and np.sign(speed) != senses[k]:
+                    if senses[k] == 0:
+                        self._note(time, "break-away", float(np.sign(speed)), of=self.motion.resisted[k])
+                    senses[k] = int(np.sign(speed))
+            self.mode = self.mode._replace(senses=tuple(senses))
         self._project(time, row, places)
         self.pauses = dict(pauses)
-
-    def _torn(self, time: float, row: Array) -> None:
-        """Joints that stuck until an impact slide on with the speeds that it leaves them."""
-        senses = list(self.mode.senses)
-        for k, speed in enumerate(self.motion.ways(self.moment(time, row))[1]):
-            if abs(speed) > SLOW and np.sign(speed) != senses[k]:
-                if senses[k] == 0:
-                    self._note(time, "break-away", float(np.sign(speed)), of=self.motion.resisted[k])
-                senses[k] = int(np.sign(speed))
-        self.mode = self.mode._replace(senses=tuple(senses))
 
     # ---- closed -----------------------------------------------------------------------------------------------
 
@@ -371,7 +368,7 @@ def integration_of(
     motion: FreeMotion, rates: Dynamics, load_places: Places, duration: float, tolerance: float,
     progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS, start: float = 0.0,
     mode: Mode | None = None,
-) -> Integration:  # fmt: skip
+) -> ActiveMotion:  # fmt: skip
     """What integrates a motion. duration, evaluations, start, mode: see `Integration`."""
     kind = ImpactMotion if any(contact.rigid for contact in motion.contacts) else ActiveMotion
     return kind(

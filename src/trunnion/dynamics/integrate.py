@@ -12,9 +12,7 @@ What holds, slips and is open until then: see `active_motion`.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,9 +22,9 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 
 from trunnion.algebra.dual import single
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.guards import Crossing, Guards, dead_centre, first_crossing
+from trunnion.dynamics.guards import Guards, dead_centre
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
-from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
+from trunnion.dynamics.solution import Ended, Event, Solution
 from trunnion.dynamics.start import Places
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
@@ -37,14 +35,9 @@ __all__ = ["FINEST", "MOST_EVALUATIONS", "Integration"]
 Array = NDArray[np.float64]
 
 FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
-MOST_EVENTS = 100_000
 MOST_EVALUATIONS = 2_000_000  # of the forces, if not stated otherwise
-WALK = 25  # evaluations by machine code that take about as long as a walk through the modules
-CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
-STUCK = 50  # events at one time
-LOOKS, SCANNED = 12, 200  # times within a step, and within a rest, at which one looks for what changes
 SHRUNK = 4  # steps, each no longer than the last, from which a dead centre is looked for
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 NEAR = 1e-8  # of the coordinate: places that are one
@@ -53,25 +46,13 @@ INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walk
 MEETING = 1e-3  # likewise, of a bend at which assemblies meet: the digits of the accelerations are lost like its square
 
 
-class _Over(Exception):  # noqa: N818 (it is no error)
-    """The motion ends with the last step; `Solution.ended` says why."""
-
-
-class _Changed(Exception):  # noqa: N818 (it is no error)
-    """A row of the motion has changed within a step, which ends there. stretch: of the step to its end."""
-
-    def __init__(self, crossing: Crossing, stretch: Stretch) -> None:
-        super().__init__()
-        self.crossing, self.stretch = crossing, stretch
-
-
 @dataclass
-class Integration(ABC):
+class Integration:
     """One motion from its initial state.
 
     progress: told the share of the duration that is reached; times: s, at which a load jumps or bends; evaluations: of
-    the forces, at most, a walk counted as WALK; start: time, s, at which it begins; duration: at which it ends; mode:
-    what is so until something switches; resting: whether all free coordinates rest.
+    the forces, at most, a walk counted as several; start: time, s, at which it begins; duration: at which it ends;
+    mode: what is so until something switches; resting: whether all free coordinates rest.
     """
 
     motion: FreeMotion
@@ -103,93 +84,9 @@ class Integration(ABC):
         self._walked = self.motion.walked[0]
         self.guards = Guards(self.motion, self.layout, self.places.limits)
 
-    # ---- the whole way ----------------------------------------------------------------------------------------
-
-    def run(self, row: Array) -> Solution:
-        """The motion from an initial row."""
-        with suppress(_Over):
-            self._run(row)
-        return self.solution
-
-    def _run(self, row: Array) -> None:
-        self._follow(self.start, row)
-        if not self._begins(row):
-            return
-        before, time, stayed = self.start - 1.0, self.start, 0
-        for _ in range(MOST_EVENTS):
-            self.last = time, row
-            if time >= self.duration * (1 - CLOSE) or self.solution.ended:
-                return
-            stayed, before = (stayed + 1 if time == before else 0), time
-            if stayed > STUCK:
-                self._stop("step", time, row)
-                return
-            k = next(k for k, time_of_break in enumerate(self.breaks) if time_of_break > time + CLOSE * self.duration)
-            until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else self.start))
-            self.mode = self.mode._replace(now=now)
-            if not self._decided(time, row):
-                return
-            try:
-                time, row = self._move(time, row, until)
-            except _Changed as change:
-                time, stretch = change.crossing.time, change.stretch
-                row = stretch.state(np.array([time]))[:, 0]
-                self._follow(time, row)
-                self.step = min(self._changed(change.crossing, row), self.step)
-        self.end("events", time, {"count": float(MOST_EVENTS)})
-
     def moment(self, time: float, row: Array) -> Moment:
         """The state of a row."""
         return self.layout.moment(np.array([time]), row[:, None], self.mode)
-
-    # ---- what holds, slips or is open: see `active_motion` ---------------------------------------------------------
-
-    @abstractmethod
-    def _decided(self, time: float, row: Array) -> bool:
-        """Find the mode from here on; `row` is what it is after it. Whether there is one."""
-
-    @abstractmethod
-    def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
-        """By time what stays above 0 within a step while its mode lasts, (number, time); None: there is nothing."""
-
-    @abstractmethod
-    def _changed(self, crossing: Crossing, row: Array) -> float:
-        """Let one change, and `row` with it; how long the first step after it may be, s."""
-
-    @abstractmethod
-    def _measured(self, stretch: Stretch) -> None:
-        """What contacts come to in a step."""
-
-    def _end_step(self, solver: OdeSolver, row: Array) -> None:  # noqa: B027 (what is closed needs it)
-        """What they need at the end of a step."""
-
-    def _begins(self, row: Array) -> bool:
-        """Whether there are accelerations at the start; they also tell what rates are typical."""
-        n, start = self.layout.coordinates, self.start
-        if self.motion.several:
-            if not self._decided(start, row):
-                return False
-        elif self.motion.resisted:
-            if row[n] == 0.0:
-                if not (assembled := self._assembled(self.moment(start, row))):
-                    self._stop("not_assembled", start, row)
-                return assembled
-            self.mode = self.mode._replace(senses=(int(np.sign(row[n])),))
-        at = self.moment(start, row)
-        with np.errstate(all="ignore"):
-            second = self.dynamics(at).second
-            if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
-                ahead = at.q + np.sign(row[n]) * self._inside(row[0])
-                second = self.dynamics(at._replace(q=ahead)).second
-                self.bends = (*self.bends, float(row[0] % self.places.period if self.places.period else row[0]))
-        if not np.all(np.isfinite(second)):
-            cause = self._cause(start, row) or "no_acceleration"
-            if self._locked(start, row, [cause]):
-                return True
-            self._stop(cause, start, row)
-            return False
-        self.pace = np.maximum(self.pace, np.maximum(np.sqrt(np.abs(second)), np.abs(row[n : 2 * n])))
-        return True
 
     def end(self, code: str, time: float, figures: dict[str, Any] | None = None) -> None:
         self.solution.ended = Ended(f"simulate.{code}", time, figures or {})
@@ -197,33 +94,6 @@ class Integration(ABC):
     def _note(self, time: float, kind: str, figure: float = np.nan, unit: str = "", of: str = "") -> None:
         """Take down an event. of: what it happens to, the first free driver if not given."""
         self.solution.events.append(Event(time, kind, of or self.motion.names[0], figure, unit))
-
-    def _crossing(self, stretch: Stretch) -> Crossing | None:
-        """The first change within a step."""
-        if (values := self._values(stretch)) is None:
-            return None
-        looks = SCANNED if stretch.resting and not self.motion.several else LOOKS
-        return first_crossing(values, stretch.begin, np.linspace(stretch.begin, stretch.end, looks + 1)[1:])
-
-    def _add(self, full: Stretch, crossing: Crossing | None) -> None:
-        """Add a step, up to where its mode changes or the motion ends in it."""
-        stretch, stretches = full if crossing is None else full._replace(end=crossing.time), self.solution.stretches
-        stretch, ended = self.guards.bounded(stretch, stretches[-1] if stretches else None)
-        self._measured(stretch)
-        stretches.append(stretch)
-        while self.guards.passed:
-            self._note(self.guards.passed.pop(), "change-point")
-        if self.progress:
-            self.progress(min(1.0, stretch.end / self.duration))
-        spent = self.solution.asked + WALK * (self.motion.walked[0] - self._walked)
-        if ended is None and spent > self.evaluations:
-            figures = {"count": self.evaluations, "of": self.duration}
-            ended = Ended("simulate.evaluations", stretch.end, figures)
-        if ended is not None:
-            self.solution.ended = ended
-            raise _Over
-        if crossing is not None:
-            raise _Changed(crossing, full)
 
     @property
     def snapshot(self) -> Snapshot | None:
@@ -235,40 +105,6 @@ class Integration(ABC):
             self.motion.step(self.moment(time, row))
 
     # ---- in motion --------------------------------------------------------------------------------------------
-
-    def _move(self, time: float, row: Array, until: float) -> tuple[float, Array]:
-        """Move, or rest, until the next break, or until something changes within a step: see `_Changed`.
-
-        A step that runs past a place at which a force jumps or bends is taken anew, up to that place.
-        """
-        self.between = self._place(float(row[0]), self.sense or float(np.sign(row[self.layout.coordinates])))
-        rate, absolute, marks = self._rate(), self._absolute(row), [time]
-        stays = self.motion.stays(self.moment(time, row))
-        first = until - time if stays else min(self.step, until - time)
-        solver = self._solver(rate, time, row, until, absolute, first)
-        while solver.status == "running":
-            before, row = float(solver.t), np.array(solver.y)
-            marks.append(before)
-            if any(len(marks) > k and before - marks[-k] < crept * self.duration for k, crept in CREEPING):
-                return self._failed(before, row)
-            solver = self._stepped(solver, rate, absolute, stays)
-            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
-                return self._failed(before, row)
-            end = float(solver.t)
-            stretch = Stretch(before, end, solver.dense_output(), self.mode, self.resting, self.snapshot)
-            crossing = self._crossing(stretch)
-            if crossing is not None and not self.motion.several:
-                near = crossing.time + PAST * (crossing.time - before)
-                if near < end - PAST * (end - before):
-                    solver = self._solver(rate, before, row, near, absolute, near - before)
-                    continue
-            self._add(stretch, crossing)
-            self._follow(end, np.array(solver.y))
-            self._end_step(solver, np.array(solver.y))
-            self._compare(before, row)
-            if self._reaches_dead_centre(solver, np.diff([*marks[-SHRUNK:], end])):
-                break
-        return float(solver.t), np.array(solver.y)
 
     def _reaches_dead_centre(self, solver: OdeSolver, sizes: Array) -> bool:
         """End the motion at a dead centre that steps, each no longer than the last, run into; sizes: of the last, s."""

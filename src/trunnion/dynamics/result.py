@@ -24,12 +24,12 @@ from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.findings import motion_findings, stated_drivers, undefined
+from trunnion.dynamics.measured import steady_figures
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import Opened, in_play
 from trunnion.dynamics.rates import CLUTCH, WORKS, kinetic_energy, potential_energy
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
-from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contact, ContactState, Push, pushes_of
 from trunnion.errors import Finding, Status

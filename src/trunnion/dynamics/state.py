@@ -460,21 +460,26 @@ class FreeMotion:
         contacts with their forces."""
         count, lanes = at.q.shape
         second, forces, shares = np.split(numbers, [count, len(numbers) - len(active.joints)])
-        onsets = self.forced(at.onsets, forces, active) if active.closed else at.onsets
         of_rows: list[Any] = list(at.senses)
         for k, share in zip(active.joints, shares, strict=True):
             of_rows[k] = share
-        senses = self.senses(at, pattern, of_rows)
-        back = self.solve(at._replace(onsets=onsets), second, senses, sliding=True)
-        moved = {k: self.contacts[k].accelerations(back.walk) for k in active.closed}
-        rows = [
-            self.demanded(back, at.q.shape) - self.given(at, second, senses),
-            *(moved[k][0] for k in active.closed),
-            *(moved[k][1] for k in active.walls),
-        ]
+        rows, back, onsets = self.misses(at, second, forces, active, self.senses(at, pattern, of_rows))
+        missed = np.array([np.broadcast_to(primal(row), lanes) for row in rows], float)
         if active.joints:
-            rows.append(self.pulls(back.walk, lanes)[list(active.joints)])
-        return np.vstack(rows), back, onsets
+            missed = np.vstack([missed, self.pulls(back.walk, lanes)[list(active.joints)]])
+        return missed, back, onsets
+
+    def misses(
+        self, at: Moment, second: Any, forces: Any, active: Held, senses: Senses
+    ) -> tuple[list[Number], Backward, tuple[Onset, ...]]:
+        """E − T of every free coordinate, and the accelerations of gaps and slips that closed contacts keep at 0; the
+        walk, and the contacts with their forces."""
+        onsets = self.forced(at.onsets, forces, active) if active.closed else at.onsets
+        back = self.solve(at._replace(onsets=onsets), second, senses, sliding=True)
+        efforts = zip(self.names, self.driven(at, second, senses), strict=True)
+        moved = {k: self.contacts[k].accelerations(back.walk) for k in active.closed}
+        rows: list[Number] = [back.efforts[name] - effort for name, effort in efforts]
+        return [*rows, *(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)], back, onsets
 
     def _linearised(self, at: Moment, numbers: Array, active: Held, pattern: Pattern) -> tuple[Array, Array]:
         """What is missed (equation, lane), and its derivatives by the unknowns (equation, unknown, lane)."""

@@ -25,12 +25,12 @@ from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.findings import motion_findings
 from trunnion.dynamics.impact_motion import integration_of
 from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
+from trunnion.dynamics.measured import BACKWARD, SPEED, TURN, DriveCourse
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.rates import Dynamics, Layout
 from trunnion.dynamics.result import filled
 from trunnion.dynamics.solution import Solution, over_steps, step_nodes
 from trunnion.dynamics.start import Places, initial_row, places
-from trunnion.dynamics.started import BACKWARD, SPEED, TURN, DriveCourse
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
@@ -233,26 +233,22 @@ def _steady_cycle(
         unstable = cycle or unstable
     if unstable is not None:
         return unstable
-    raise UnsteadyError(_why(motion, solution, course, first))
-
-
-def _why(motion: FreeMotion, solution: Solution, course: DriveCourse, first: int) -> list[Finding]:
-    """Why there is no steady cycle, from the end of the longest run-up."""
-    name, end = motion.names[first], readable(solution.end, "s")
+    # why there is none, from the end of the longest run-up
+    name, after = motion.names[first], readable(solution.end, "s")
     if not course.runs or solution.ended or solution.stretches[-1].resting:
         turns = course.travel / TURN
-        what = f"there is no steady cycle: {name} makes {turns:.3g} turns in {end} and does not go round at the end"
+        what = f"there is no steady cycle: {name} makes {turns:.3g} turns in {after} and does not go round at the end"
         remedy = "run it without --steady to see the start; give it more --time if it has not run up"
         figures = {"driver": name, "turns": turns, "time": solution.end}
         none = Finding.error("simulate.not_round", f"drivers.{name}", what, remedy, **figures)
-        return [none, *motion_findings(motion, solution, motion.run)]
+        raise UnsteadyError([none, *motion_findings(motion, solution, motion.run)])
     takes = [course.when(course.travel - k * TURN) for k in range(3)]
     before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
-    what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after {end}, changes by "
+    what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after {after}, changes by "
     what += f"{readable(last - before, 'rad/s')} a turn, and no speed is found that comes back"
     remedy = "check that its losses grow with the speed or that its motor's effort falls; or give it more --time"
     figures = {"driver": name, "speed": last, "change": last - before, "time": solution.end}
-    return [Finding.error("simulate.not_repeating", f"drivers.{name}", what, remedy, **figures)]
+    raise UnsteadyError([Finding.error("simulate.not_repeating", f"drivers.{name}", what, remedy, **figures)])
 
 
 class Section:

@@ -28,8 +28,8 @@ from pythonfmu3 import (
     Unit,
 )  # fmt: skip
 
-from trunnion.dynamics.continued import Continued
 from trunnion.dynamics.result import Books
+from trunnion.dynamics.simulate import Continued
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.exchange.skeleton import Positions
 from trunnion.joints.pairs import PAIRS

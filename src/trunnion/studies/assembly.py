@@ -6,7 +6,7 @@ offsets of their ends the smallest are looked for that close every loop, positio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -27,7 +27,7 @@ from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward
 from trunnion.solve.run import built
-from trunnion.solve.space.loops import CLOSED, Ask, End, LeastPlay, Loops, Start, ends_of, least_play, start_of
+from trunnion.solve.space.loops import CLOSED, Ask, End, LeastPlay, Loops, ends_of, least_play, start_of
 from trunnion.solve.system import Cycle, System, Values
 
 if TYPE_CHECKING:
@@ -118,101 +118,89 @@ def assemble(
     system, values = built(mechanism), mechanism.parameters()
     cycle = system.cycle(values)
     time = cycle.times(steps if cycle.duration > 0 else 1)
+    study = AssemblyStudy(system, values, cycle, time)
     if any(module.redundant for module in system.plan.modules):
-        study = AssemblyStudy.of(system, values, mechanism.ideal_parameters(), cycle, uniform)
-        answer = study.answer(time)
+        study.search(mechanism.ideal_parameters(), uniform)
     else:
-        answer = _regular(system, values, cycle, time)
+        study.regular()
     if progress:
         progress(len(time))
-    return _dataset(answer)
+    return study.dataset()
 
 
-def _regular(system: System, values: Values, cycle: Cycle, time: Array) -> Answer:
-    """Every loop has as many equations as coordinates: it closes as it is, or not at all."""
-    chosen = choose(system, values, cycle)
-    frames = [frame for pose in forward(system, values, chosen.assembly, time).poses for frame in pose.frames]
-    closes = np.isfinite(np.zeros(len(time)) + sum(primal(number) for frame in frames for number in flat(frame)))
-    arrays = _blank(system, values, time)
-    for name in ("needed_share", "needed_clearance", "open_angle", "open_length", "certificate", "closure_residual"):
-        arrays[name] = np.where(closes, 0.0, np.nan)
-    arrays["status"] = np.where(closes, AssemblyStatus.FITS, AssemblyStatus.APART).astype(np.int8)
-    plane = "in the plane no joint constrains twice" if system.mechanism.space == "planar" else ""
-    why = plane or "its joints constrain no more than its links have freedoms"
-    what = f"{why}: errors only shift its links, so it needs no clearance"
-    return Answer(system, values, time, arrays, (*chosen.findings, Finding.note("assembly.no_need", "joints", what)))
-
-
-def _labels(system: System) -> dict[str, list[str]]:
-    """Names along the dimensions."""
-    ends = {"end": ["1", "2", "3", "4"], "axis": ["x", "y", "z"]}
-    return {"driver": list(system.mechanism.drivers), "joint": list(system.joints), **ends}
-
-
-def _blank(system: System, values: Values, time: Array) -> dict[str, NDArray[Any]]:
-    """The arrays of FIGURES without what is looked for."""
-    sizes = {"position": len(time), **{dim: len(names) for dim, names in _labels(system).items()}}
-    arrays = {
-        name: np.full([sizes[dim] for dim in variable.dims], 0.0 if variable.dims == PARTS else np.nan)
-        for name, variable in FIGURES.items()
-    }
-    arrays["status"] = np.zeros(len(time), np.int8)
-    for i, driver in enumerate(system.mechanism.drivers):
-        arrays["drive_coordinate"][i] = primal(system.drive(values, driver, time)[0])
-    arrays["smallest_clearance"], arrays["largest_share"] = np.zeros(()), np.zeros(())
-    return arrays
-
-
-@dataclass(frozen=True)
+@dataclass
 class AssemblyStudy:
-    """An over-constrained mechanism with its errors, the plays that it states, and those of the smallest clearance.
+    """A mechanism with its errors, and what is found at times, s: `arrays` by the names of FIGURES.
 
-    evened: for each end of `pins`, whether its play is the clearance that is looked for; the others stay.
+    stated: ends of the plays that it states; pins: those of the smallest clearance, of which it is that of those that
+    are `evened`, while the others stay; share, clearance: the largest needs of the cycle, each with its time.
     """
 
     system: System
     values: Values
     cycle: Cycle
-    start: Start
-    stated: tuple[End, ...]
-    pins: tuple[End, ...]
-    evened: tuple[bool, ...]
-    findings: tuple[Finding, ...]
+    time: Array
 
-    @classmethod
-    def of(cls, system: System, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> AssemblyStudy:
-        """A mechanism with the numbers as built and those without errors."""
-        ends = tuple(ends_of(system, values, every_pin=False))
-        every = not any(end.pin for end in ends) and not (uniform == "all" and ends)
-        pins = tuple(ends_of(system, values, every_pin=every))
-        evened = tuple(end.pin or uniform == "all" for end in pins)
-        start, findings = start_of(system, values, ideal, cycle)
-        return cls(system, values, cycle, start, ends, pins, evened, tuple(findings))
+    def __post_init__(self) -> None:
+        self.stated, self.pins = tuple[End, ...](), tuple[End, ...]()
+        self.evened, self.notes = tuple[bool, ...](), list[Finding]()
+        self.share = self.clearance = 0.0, 0.0
+        self.labels = {
+            "driver": list(self.system.mechanism.drivers),
+            "joint": list(self.system.joints),
+            "end": ["1", "2", "3", "4"],
+            "axis": ["x", "y", "z"],
+        }
+        sizes = {"position": len(self.time), **{dim: len(names) for dim, names in self.labels.items()}}
+        self.arrays: dict[str, NDArray[Any]] = {
+            name: np.full([sizes[dim] for dim in variable.dims], 0.0 if variable.dims == PARTS else np.nan)
+            for name, variable in FIGURES.items()
+        }
+        self.arrays["smallest_clearance"], self.arrays["largest_share"] = np.zeros(()), np.zeros(())
+        for i, driver in enumerate(self.system.mechanism.drivers):
+            self.arrays["drive_coordinate"][i] = primal(self.system.drive(self.values, driver, self.time)[0])
 
-    def solve(self, time: Array, stated: bool) -> LeastPlay:
-        """The least share of the stated plays, or the smallest clearance, at times; ∞ where no play is there."""
-        ends = self.stated if stated else self.pins
-        radii = np.array([end.radius for end in ends])
-        evened = np.array(self.evened, float)
-        base, share = (np.zeros(len(ends)), radii) if stated else (radii * (1 - evened), evened)
-        ask = Ask(base, share, tuple(len(end.axes) for end in ends))
-        loops, none = Loops.of(self.system, self.values, ends, time), np.zeros((len(time), sum(ask.widths)))
-        with np.errstate(all="ignore"):
-            q, gap = loops.least_open(self.start(time), none)
-            fits = gap <= CLOSED
-            if not ends or np.all(fits | np.isnan(gap)):
-                least = np.where(np.isnan(gap), np.nan, np.where(fits, 0.0, np.inf))
-                return LeastPlay(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
-            least_plays = least_play(loops, q, none, ask)
-        # what is found where it closes as it is is rounding
-        for array in (least_plays.least, least_plays.bound, least_plays.offsets, least_plays.weights):
-            array[fits] = 0.0
-        return least_plays
+    @property
+    def of(self) -> str:
+        """Joints whose clearance is looked for."""
+        even = (end.joint for end, evened in zip(self.pins, self.evened, strict=True) if evened)
+        return ", ".join(dict.fromkeys(even))
 
-    def answer(self, time: Array) -> Answer:
-        """Needs, openings, offsets and statuses at times, and the largest needs of the cycle."""
-        arrays = _blank(self.system, self.values, time)
-        exists, opened = self._open(time, arrays)
+    # ---- the search -------------------------------------------------------------------------------------------
+
+    def regular(self) -> None:
+        """Every loop has as many equations as coordinates: it closes as it is, or not at all."""
+        chosen = choose(self.system, self.values, self.cycle)
+        poses = forward(self.system, self.values, chosen.assembly, self.time).poses
+        numbers = [primal(number) for pose in poses for frame in pose.frames for number in flat(frame)]
+        closes = np.isfinite(np.zeros(len(self.time)) + sum(numbers))
+        for name in (name for name, variable in FIGURES.items() if variable.dims == LANES):
+            self.arrays[name] = np.where(closes, 0.0, np.nan)
+        self.arrays["status"] = np.where(closes, AssemblyStatus.FITS, AssemblyStatus.APART).astype(np.int8)
+        plane = "in the plane no joint constrains twice" if self.system.mechanism.space == "planar" else ""
+        why = plane or "its joints constrain no more than its links have freedoms"
+        what = f"{why}: errors only shift its links, so it needs no clearance"
+        self.notes += [*chosen.findings, Finding.note("assembly.no_need", "joints", what)]
+
+    def search(self, ideal: Values, uniform: Uniform) -> None:
+        """Find needs, openings, offsets and statuses, and the largest needs of the cycle. ideal: numbers without
+        errors."""
+        system, values, time, arrays = self.system, self.values, self.time, self.arrays
+        self.stated = tuple(ends_of(system, values, every_pin=False))
+        every = not any(end.pin for end in self.stated) and not (uniform == "all" and self.stated)
+        self.pins = tuple(ends_of(system, values, every_pin=every))
+        self.evened = tuple(end.pin or uniform == "all" for end in self.pins)
+        self.start, findings = start_of(system, values, ideal, self.cycle)
+        self.notes += findings
+        # how far the loops are open where they are so least without play, in angle and in length
+        loops, none = Loops.of(system, values, (), time), np.zeros((len(time), 0))
+        q, gap = loops.least_open(self.start(time), none)
+        rows = loops.linear(q, none).gap[:, : 6 * len(loops.group.chords)].reshape(len(time), -1, 2, 3)
+        exists, opened = np.isfinite(gap), gap > CLOSED
+        rows = np.where((gap <= CLOSED)[:, None, None, None], 0.0, rows)  # rounding
+        sizes = np.max(np.linalg.norm(rows, axis=-1), axis=1)
+        sizes[(sizes < ROUNDING) & (sizes < np.max(sizes, axis=1, keepdims=True))] = 0.0
+        arrays["open_angle"], arrays["open_length"] = sizes[:, 0], sizes[:, 1] * loops.size
         zero, count = np.where(exists, 0.0, np.nan), len(time)
         shares, needs = (  # as they are where the loops close without any play
             LeastPlay(zero, zero, zero, np.zeros((count, width)), np.zeros((count, len(ends))), zero, 0)
@@ -222,8 +210,8 @@ class AssemblyStudy:
         if np.any(opened):
             findings = []
             for name in dict.fromkeys(end.joint for end in self.pins):
-                model = CLEARANCE_MODELS["spatial"][self.system.joints[name][0]]
-                if model.size and not np.all(primal(shifts.length_of(model, self.values, name)) > 0):
+                model = CLEARANCE_MODELS["spatial"][system.joints[name][0]]
+                if model.size and not np.all(primal(shifts.length_of(model, values, name)) > 0):
                     part, keys = model.size
                     what = f"how far the {part} can lean in its play depends on its length, which is not stated"
                     findings.append(Finding(what, f"joints.{name}.{part}", f"state {' or '.join(keys)}: 20 mm"))
@@ -237,10 +225,10 @@ class AssemblyStudy:
             most = np.maximum(*rows)
             return np.where(np.isfinite(most), most, np.nan)
 
-        def gap(search: LeastPlay) -> Array:
-            return (search.least - search.bound) / np.where(search.least > 0, search.least, 1.0)
-
-        arrays["closure_residual"], arrays["certificate"] = larger(lambda search: search.opening), larger(gap)
+        arrays["closure_residual"] = larger(lambda search: search.opening)
+        arrays["certificate"] = larger(
+            lambda search: (search.least - search.bound) / np.where(search.least > 0, search.least, 1.0)
+        )
         arrays["needed_share"], arrays["needed_clearance"] = shares.least, needs.least
         self._place(shares, self.stated, arrays["stated_offset"], arrays["stated_part"])
         self._place(needs, self.pins, arrays["uniform_offset"], arrays["uniform_part"])
@@ -251,30 +239,28 @@ class AssemblyStudy:
         )
         status = np.where(np.isnan(shares.least) | np.isnan(needs.least), AssemblyStatus.UNSETTLED, status)
         arrays["status"] = np.where(exists, status, AssemblyStatus.APART).astype(np.int8)
-        share = clearance = (0.0, 0.0)
         if np.any(opened):
-            share, clearance = (self._largest(time, of.least, of is shares) for of in (shares, needs))
-        arrays["largest_share"], arrays["smallest_clearance"] = np.array(share[0]), np.array(clearance[0])
-        even = [end for end, evened in zip(self.pins, self.evened, strict=True) if evened]
-        return Answer(
-            self.system, self.values, time, arrays, self.findings, share, clearance,
-            ", ".join(dict.fromkeys(end.joint for end in even)), all(end.pin for end in even), bool(self.stated),
-        )  # fmt: skip
+            self.share, self.clearance = (self._largest(of.least, of is shares) for of in (shares, needs))
+        arrays["largest_share"], arrays["smallest_clearance"] = np.array(self.share[0]), np.array(self.clearance[0])
 
-    def _open(self, time: Array, arrays: Mapping[str, Array]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """How far the loops are open where they are so least without play, in angle and in length.
-
-        Returns where they exist, and where they are open.
-        """
-        loops, none = Loops.of(self.system, self.values, (), time), np.zeros((len(time), 0))
-        with np.errstate(all="ignore"):
-            q, gap = loops.least_open(self.start(time), none)
-            rows = loops.linear(q, none).gap[:, : 6 * len(loops.group.chords)].reshape(len(time), -1, 2, 3)
-        rows = np.where((gap <= CLOSED)[:, None, None, None], 0.0, rows)  # rounding
-        sizes = np.max(np.linalg.norm(rows, axis=-1), axis=1)
-        sizes[(sizes < ROUNDING) & (sizes < np.max(sizes, axis=1, keepdims=True))] = 0.0
-        arrays["open_angle"][:], arrays["open_length"][:] = sizes[:, 0], sizes[:, 1] * loops.size
-        return np.isfinite(gap), gap > CLOSED
+    def solve(self, time: Array, stated: bool) -> LeastPlay:
+        """The least share of the stated plays, or the smallest clearance, at times; ∞ where no play is there."""
+        ends = self.stated if stated else self.pins
+        radii = np.array([end.radius for end in ends])
+        evened = np.array(self.evened, float)
+        base, share = (np.zeros(len(ends)), radii) if stated else (radii * (1 - evened), evened)
+        ask = Ask(base, share, tuple(len(end.axes) for end in ends))
+        loops, none = Loops.of(self.system, self.values, ends, time), np.zeros((len(time), sum(ask.widths)))
+        q, gap = loops.least_open(self.start(time), none)
+        fits = gap <= CLOSED
+        if not ends or np.all(fits | np.isnan(gap)):
+            least = np.where(np.isnan(gap), np.nan, np.where(fits, 0.0, np.inf))
+            return LeastPlay(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
+        least_plays = least_play(loops, q, none, ask)
+        # what is found where it closes as it is is rounding
+        for array in (least_plays.least, least_plays.bound, least_plays.offsets, least_plays.weights):
+            array[fits] = 0.0
+        return least_plays
 
     def _place(self, search: LeastPlay, ends: Sequence[End], offsets: Array, parts: Array) -> None:
         """Offsets and parts of the ends at their places in the result."""
@@ -287,8 +273,9 @@ class AssemblyStudy:
                 offsets[joint, end.number, "xyz".index(axis)] = np.where(solved, search.offsets[:, column], np.nan)
                 column += 1
 
-    def _largest(self, time: Array, needs: Array, stated: bool) -> tuple[float, float]:
+    def _largest(self, needs: Array, stated: bool) -> tuple[float, float]:
         """The largest need of the cycle and its time: between the positions too, beside the largest of them."""
+        time = self.time
         heights = np.where(np.isnan(needs), -np.inf, needs)
         top = int(np.argmax(heights))
         if not np.all(np.isfinite(needs)) or len(time) < 3 or not heights[top] > 0:
@@ -308,28 +295,7 @@ class AssemblyStudy:
         top = int(np.argmax(most))
         return float(most[top]), float(best[top])
 
-
-# ---- the answer in words --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What was found at times, s: arrays by the names of FIGURES.
-
-    share, clearance: the largest needs of the cycle, each with its time; of: joints whose clearance is looked for;
-    pins: whether they are pins alone; played: whether any play is stated.
-    """
-
-    system: System
-    values: Values
-    time: Array
-    arrays: dict[str, NDArray[Any]]
-    notes: tuple[Finding, ...]
-    share: tuple[float, float] = (0.0, 0.0)
-    clearance: tuple[float, float] = (0.0, 0.0)
-    of: str = ""
-    pins: bool = True
-    played: bool = False
+    # ---- the answer ---------------------------------------------------------------------------------------------
 
     def at(self, status: AssemblyStatus) -> str:
         """The positions that came to a status, in words; empty if none did."""
@@ -365,7 +331,7 @@ class Answer:
             angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
             sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
             which = "the joints with play cannot close the loops, however large the play (a clearance of 0 gives none)"
-            which = which if self.played else "no play is stated (a clearance of 0 gives none)"
+            which = which if self.stated else "no play is stated (a clearance of 0 gives none)"
             what = f"{which}: the loops stay open by up to {' and '.join(sizes)} {at}"
             faults.append(Finding.error("assembly.no_play", "joints", what, self._remedy(), **figures))
         if at := self.at(AssemblyStatus.UNSETTLED):
@@ -383,7 +349,8 @@ class Answer:
         if not np.isfinite(need):
             return "state a clearance of pins, an end float of pins without axial freedom, or correct the axes"
         size = f"{_enough(1e3 * need)} mm" if need >= 1e-4 else f"{_enough(1e6 * need)} um"
-        pins, place = "the pins " if self.pins else "", self.place("needed_clearance")
+        every = all(end.pin for end, evened in zip(self.pins, self.evened, strict=True) if evened)
+        pins, place = "the pins " if every else "", self.place("needed_clearance")
         return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed {place}"
 
     def summary(self) -> list[Figure]:
@@ -398,7 +365,7 @@ class Answer:
         ]
         if angle > 0 or length > 0:
             figures = [figure for figure, size in zip(figures, (angle, length), strict=True) if size > 0]
-        if self.played:
+        if self.stated:
             needed = f"{share:.10g}" if f"{share:.6g}" == "1" else "∞" if np.isinf(share) else share
             figures.append(Figure("largest_share", "needed share of the stated clearances", needed))
             if 0 < share < np.inf:
@@ -418,24 +385,22 @@ class Answer:
             figures.append(Figure("smallest_clearance.parts", "  share of each joint's clearance", text, ""))
         return figures
 
-
-def _dataset(answer: Answer) -> xr.Dataset:
-    """The result with names, units and provenance."""
-    system, values = answer.system, answer.values
-    mechanism = system.mechanism
-    attributes = origin(
-        mechanism,
-        system.plan.formula,
-        assembling=answer.of,
-        inputs=inputs(mechanism),
-        **Scales(float(np.max(system.size(values))), 1.0, 0.0).summary(answer.summary()),
-        findings=finding_rows(answer.findings()),
-        periodic=int(system.cycle(values).periodic),
-    ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
-    along = driven(answer.time, *system.dial(values, answer.time))
-    along["time"].attrs["long_name"] = "time"
-    variables = described({name: answer.arrays[name] for name in FIGURES}, FIGURES, member_units(system))
-    return dataset_of("assembly", variables, _labels(system), attributes, along)
+    def dataset(self) -> xr.Dataset:
+        """The result with names, units and provenance."""
+        system, values, mechanism = self.system, self.values, self.system.mechanism
+        attributes = origin(
+            mechanism,
+            system.plan.formula,
+            assembling=self.of,
+            inputs=inputs(mechanism),
+            **Scales(float(np.max(system.size(values))), 1.0, 0.0).summary(self.summary()),
+            findings=finding_rows(self.findings()),
+            periodic=int(system.cycle(values).periodic),
+        ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
+        along = driven(self.time, *system.dial(values, self.time))
+        along["time"].attrs["long_name"] = "time"
+        variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES, member_units(system))
+        return dataset_of("assembly", variables, self.labels, attributes, along)
 
 
 def _enough(size: float) -> str:

@@ -113,7 +113,23 @@ def _worked(job: Job, blocks: list[int], jobs: int, threads: bool, cluster: str 
         with ThreadPoolExecutor(workers) as executor:
             yield from _spread(job.prepare(), blocks, executor, workers)
     else:
-        yield from _by_processes(job, blocks, workers)
+        left, deaths, packed = dict.fromkeys(blocks), 0, pickle.dumps(job)
+        while left:  # those that die are replaced, and the blocks under way are done again
+            with _pool(workers) as pool:
+                try:
+                    for block, part in _spread(partial(_work, packed), list(left), pool, workers):
+                        del left[block]
+                        deaths = 0
+                        yield block, part
+                except BrokenProcessPool:
+                    deaths += 1
+            if deaths >= DEATHS:
+                what = f"{DEATHS} workers died in turn, the next block being {next(iter(left))}"
+                remedy = (
+                    "often too little memory: fewer --jobs, fewer --steps; "
+                    "a script calls this under `if __name__ == '__main__':`"
+                )
+                raise MechanismError(Finding(what, "jobs", remedy))
 
 
 def _spread(
@@ -136,27 +152,6 @@ def _spread(
 
 
 # ---- processes ------------------------------------------------------------------------------------------------
-
-
-def _by_processes(job: Job, blocks: Iterable[int], workers: int) -> Iterator[tuple[int, Part]]:
-    """Parts by processes. Those that die are replaced, and the blocks under way are done again."""
-    left, deaths, packed = dict.fromkeys(blocks), 0, pickle.dumps(job)
-    while left:
-        with _pool(workers) as pool:
-            try:
-                for block, part in _spread(partial(_work, packed), list(left), pool, workers):
-                    del left[block]
-                    deaths = 0
-                    yield block, part
-            except BrokenProcessPool:
-                deaths += 1
-        if deaths >= DEATHS:
-            what = f"{DEATHS} workers died in turn, the next block being {next(iter(left))}"
-            remedy = (
-                "often too little memory: fewer --jobs, fewer --steps; "
-                "a script calls this under `if __name__ == '__main__':`"
-            )
-            raise MechanismError(Finding(what, "jobs", remedy))
 
 
 @contextmanager

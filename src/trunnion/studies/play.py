@@ -10,7 +10,7 @@ the offset anywhere in a disc of radius ρ (an interval, a ball, n components):
 
 since ∫ x² over the unit ball of n dimensions is 1/(n + 2) of its volume: ρ²/3 in an interval, ρ²/4 in a disc, ρ²/5 in
 a ball. What pins at the rims of their holes do beyond first order is searched on the mechanism itself
-(`tolerance.search`).
+(`tolerance.effects.search`).
 """
 
 from __future__ import annotations

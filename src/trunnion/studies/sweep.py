@@ -132,7 +132,6 @@ def sweep(
         for name, variable in FIGURES.items()
         if margin or variable.part != "margin"
     }
-    measures = measures or ()
     watched = {measure.name: measure for measure in measures_of(points.run, measures)} if measures else {}
     arrays |= {name: np.full(points.shape, np.nan) for name in watched}
     for done, (index, row) in enumerate(points.solved(), 1):
@@ -144,10 +143,6 @@ def sweep(
         if progress:
             progress(done)
     findings = _with_bare(mechanism, points.swept, [*_findings(points, watched.values(), arrays)])
-    if others := [name for name in mechanism.measures if name not in measures]:
-        what = f"not in this sweep: {agreeing(len(others), 'measure', 'measures')} {', '.join(others)} of the model"
-        remedy = "add with --measure, in Python with measures=[…]"
-        findings.append(Finding.note("sweep.measures_left_out", "measures", what, remedy, measures=others))
     if not points.erring:
         of_errors = {name for name, variable in FIGURES.items() if variable.part == "errors"}
         arrays = {name: array for name, array in arrays.items() if name not in of_errors}
@@ -387,8 +382,18 @@ class Points:
             return False
         if not self._followed:
             return True
-        (point,) = self._together([index])
-        return point is None or _agree(point, self._alone(index, run))
+        (together,) = self._together([index])
+        if together is None:
+            return True
+        # whether both cycles come to the same statuses, efforts and reactions; powers follow from these
+        alone, exact = self._alone(index, run), ("status", "without_answer")
+        rough = [name for name in ("drive_effort_rms", "drive_effort_max", "reaction_max") if name in together]
+        if together.keys() != alone.keys() or any(together[name] != alone[name] for name in exact):
+            return False
+        return all(
+            np.allclose(together[name], alone[name], rtol=0.0, atol=SAME * np.max(np.abs(alone[name])))
+            for name in rough
+        )
 
     def _values(self, points: Sequence[Index], ideal: bool = False) -> dict[str, Number]:
         """Every number of the mechanism, (point, 1) where it varies."""
@@ -484,17 +489,6 @@ class Points:
                 own = {path: nth(value, k) for path, value in drive.items()}
                 cycles.append(self.run.system.cycle(own) if varies else self.run.cycle)
         return cycles
-
-
-def _agree(together: Reduced, other: Reduced) -> bool:
-    """Whether two cycles come to the same statuses, efforts and reactions; powers follow from these."""
-    if together.keys() != other.keys() or any(together[name] != other[name] for name in ("status", "without_answer")):
-        return False
-    return all(
-        np.allclose(together[name], other[name], rtol=0.0, atol=SAME * np.max(np.abs(other[name])))
-        for name in ("drive_effort_rms", "drive_effort_max", "reaction_max")
-        if name in together
-    )
 
 
 def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np.bool_]:

@@ -106,30 +106,24 @@ def grid(mechanism: Mechanism, over: Over) -> tuple[Swept, ...]:
             what = f"the name '{name}' is also one of the result"
             raise MechanismError(Finding(what, "over", f"write it as {path}"))
         paths[path] = name
-    counts = [_count(name, values) for name, values in over.items()]
+    counts = list[int]()
+    for name, values in over.items():
+        remedy = "give a list of values, or from, to and count such as 0deg:30deg:7"
+        if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)) or np.ndim(values) > 1:
+            raise MechanismError(Finding(f"'{values}' is no range and no list of values", name, remedy))
+        count: Any = len(values)
+        if isinstance(values, tuple):
+            count = values[-1] if len(values) == 3 else 0
+            if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 2:
+                raise MechanismError(Finding(f"{values} is not from, to and a count of 2 or more", name, remedy))
+        elif not count:
+            raise MechanismError(Finding("has no values", name, remedy))
+        counts.append(int(count))
     points = int(np.prod(counts, dtype=object))
     if points > MOST_POINTS:
         what = f"a grid of {' × '.join(f'{count:,}' for count in counts)} points"
         raise MechanismError(Finding(what, "over", f"give at most {MOST_POINTS:,} in all"))
     return tuple(_swept(mechanism, name, path, over[name]) for path, name in paths.items())
-
-
-def _count(name: str, values: Any) -> int:
-    """How many values there are of a name; MechanismError if that is none."""
-    remedy = "give a list of values, or from, to and count such as 0deg:30deg:7"
-    if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)) or np.ndim(values) > 1:
-        raise MechanismError(Finding(f"'{values}' is no range and no list of values", name, remedy))
-    if not isinstance(values, tuple):
-        if not len(values):
-            raise MechanismError(Finding("has no values", name, remedy))
-        return len(values)
-    count = values[-1] if len(values) == 3 else None
-    if not isinstance(count, (int, np.integer)) or isinstance(count, bool):
-        raise MechanismError(Finding(f"{values} is not from, to and count", name, remedy))
-    if count < 2:
-        what = f"a range of {count} value{'s' * (count != 1)} has no two ends"
-        raise MechanismError(Finding(what, name, "give a count of 2 or more, or a single value"))
-    return int(count)
 
 
 def _swept(mechanism: Mechanism, name: str, path: str, sweep_values: Any) -> Swept:
@@ -208,8 +202,11 @@ def reduced(
     """
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
-    figures: Reduced = {"status": int(np.max(status)), "without_answer": missing}
-    figures["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
+    figures: Reduced = {
+        "status": int(np.max(status)),
+        "without_answer": missing,
+        "not_valid": int(np.count_nonzero(status == Status.CONTACT_LOST)),
+    }
     if margin is not None:
         least, answered = least_margin(margin), np.all(status < Status.LOAD_UNDEFINED)
         figures["locking_margin"] = np.nan if not answered else np.inf if least is None else least.value

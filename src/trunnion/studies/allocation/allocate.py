@@ -300,11 +300,18 @@ class _Rounds:
         Rows that move stay in the problem, so that the answer keeps all that they were. tight: what the limits of a
         measure are multiplied by.
         """
-        contributions = tuple(_contribution(name, self.prices.get(name)) for name in now.inputs.names)
+        contributions = list[Contribution]()
+        for name in now.inputs.names:
+            if (price := self.prices.get(name)) is None:  # the whole tolerance
+                contributions.append(Contribution(name, 1.0))
+            else:
+                cost = Cost(price.model, price.parameters) if price.model else None
+                bounds = price.choices, price.group, price.least, price.most
+                contributions.append(Contribution(name, 0.0, cost, *bounds))
         rows = everything = rows_of(now, _stated(now, self.prices), self.criterion, tight)
         for count in range(ROUNDS):
             everything = joined([rows, everything.picked(everything.moving)]) if count else rows
-            problem = AllocationProblem(contributions, everything.effects)
+            problem = AllocationProblem(tuple(contributions), everything.effects)
             outside = _nominal_outside(now)
             answer = none(problem, outside) if outside else self.solved(problem)
             if not answer.found:
@@ -335,14 +342,6 @@ class _Rounds:
                     tight[name] = tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
             settled = self.settled(settled.study, tight)
         return settled
-
-
-def _contribution(name: str, price: Price | None) -> Contribution:
-    """What a number may be; its whole tolerance where it has no cost."""
-    if price is None:
-        return Contribution(name, 1.0)
-    cost = Cost(price.model, price.parameters) if price.model else None
-    return Contribution(name, 0.0, cost, price.choices, price.group, price.least, price.most)
 
 
 def _same(answer: Answer, rows: Rows, ahead: Rows) -> bool:

@@ -241,10 +241,10 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
         what += f"is {say(row, over)}{places[row]}"
         if problem.caps is not None:
             what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
-        remedy, figures = (
+        remedy, where = (
             f"widen the limit, or narrow first '{largest.name}', the largest share",
-            {"limit": limit, "takes": over},
+            label or f"row {row + 1}",
         )
-        where = label or f"row {row + 1}"
+        figures = {"limit": limit, "takes": over}
         findings.append(Finding.error("allocation.impossible", where, what, remedy, **figures))
     return findings

@@ -104,19 +104,16 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
     answer = allocated.answer
     arrays = {**_by_parameter(allocated, toleranced), **_by_measure(allocated, toleranced)}
     before = [_cost_of(price, allocated.before[name]) for name, price in allocated.prices.items()]
-    totals = {
+    arrays |= {
         "cost_total": answer.cost,
         "cost_total_before": sum(before),
         "cost_bound": answer.bound,
         "gap": answer.gap,
     }
     if allocated.criterion == "yield":
-        totals["yield_expected"] = answer.expected
+        arrays["yield_expected"] = answer.expected
     if answer.checked is not None:
-        totals |= {
-            f"yield_checked{end}": share for end, share in zip(("", "_low", "_high"), answer.checked, strict=True)
-        }
-    arrays |= {name: np.array(total) for name, total in totals.items()}
+        arrays |= zip(("yield_checked", "yield_checked_low", "yield_checked_high"), answer.checked, strict=True)
     if allocated.offers:
         arrays["trade_off_factor"] = np.array([factor for factor, _ in allocated.offers])
         arrays["trade_off_cost"] = np.array([offer.cost for _, offer in allocated.offers])
@@ -183,11 +180,8 @@ def _by_measure(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
     count, positions, rows = toleranced.sizes["measure"], toleranced.sizes["position"], allocated.rows
     used, saving, curve = np.full(count, np.nan), np.full(count, np.nan), np.full((count, positions), np.nan)
     if allocated.answer.found:
-        shares, table, answer = (
-            allocated.answer.used,
-            allocated.study.table(int(toleranced.attrs["steps"])),
-            allocated.answer,
-        )
+        answer = allocated.answer
+        shares, table = answer.used, allocated.study.table(int(toleranced.attrs["steps"]))
         for k in np.unique(rows.measure):
             used[k], saving[k] = np.max(shares[rows.measure == k]), np.sum(answer.price[rows.measure == k])
         for k in range(count):
@@ -235,10 +229,6 @@ def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]
         what = f"the optimality gap is {answer.gap:.1e} of the cost of the tolerances"
         remedy = "check the orders of magnitude"
         yield Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=answer.gap)
-    if criterion != "yield" and allocated.study.effects.correlated:
-        what = f"the criterion {criterion} ignores the correlations"
-        remedy = "use a yield, which includes them"
-        yield Finding.warning("allocation.correlations_left_out", "correlations", what, remedy, criterion=criterion)
     if criterion == "worst-case":
         yield from _searched(allocated, toleranced)
     if criterion == "rss" and "yield" in toleranced:  # three deviations of a normal distribution is what RSS stands for
@@ -264,9 +254,9 @@ def _searched(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]
             severity = Severity.ERROR if excess > ROUGH else Severity.WARNING if excess > SLIGHT else Severity.NOTE
             texts = [signed(value, *drawn_in(limit, units[k]), "", 6) for value in (worst, limit)]
             what = (
-                f"the worst case of the mechanism, {texts[0]}, exceeds the limit {texts[1]} by {100 * excess:.2g} %; "
+                f"the worst case of the mechanism, {texts[0]}, exceeds the limit {texts[1]}, which first order meets, "
             )
-            what += f"to first order it is met (up to {100 * ROUGH:g} % beyond is accepted)"
+            what += f"by {100 * excess:.2g} % (up to {100 * ROUGH:g} % beyond is accepted)"
             remedy = "use --exact (in Python exact=True), which narrows the tolerances"
             figures = {"worst": worst, "limit": limit, "percent": 100 * excess, "accepted": 100 * ROUGH}
             where = f"measures.{of.measure.name}"

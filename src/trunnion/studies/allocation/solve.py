@@ -73,8 +73,15 @@ def cheapest(problem: AllocationProblem) -> Answer:
     ]
     if trouble:
         return none(problem, trouble)
+    answer = None
     try:
-        answer = _Choices(problem, task, groups).cheapest() if groups else _continuous(problem, task)
+        if groups:
+            answer = _Choices(problem, task, groups).cheapest()
+        elif (point := minimise(task)) is not None:
+            tolerances = task.tolerances(point.u)
+            price, costs = np.zeros(len(problem.effects.offset)), problem.costs(tolerances)
+            np.add.at(price, task.row[point.rows], point.multipliers / task.room[point.rows])
+            answer = Answer(problem, tolerances, costs, min(point.bound, float(np.sum(costs))), point.gap, price)
     except ArithmeticError:
         what = "the solver found no allocation, although the limits may be feasible"
         remedy = "check the orders of magnitude of costs and bounds"
@@ -83,17 +90,6 @@ def cheapest(problem: AllocationProblem) -> Answer:
         doubt = Finding("no tolerances keep all limits together", "costs", "widen a limit, or add a finer process")
         return none(problem, shortfalls(problem, least) or [doubt])
     return answer
-
-
-def _continuous(problem: AllocationProblem, task: Task) -> Answer | None:
-    """The answer where all costs are formulas; None if there is none."""
-    point = minimise(task)
-    if point is None:
-        return None
-    tolerances = task.tolerances(point.u)
-    price, costs = np.zeros(len(problem.effects.offset)), problem.costs(tolerances)
-    np.add.at(price, task.row[point.rows], point.multipliers / task.room[point.rows])
-    return Answer(problem, tolerances, costs, min(point.bound, float(np.sum(costs))), point.gap, price)
 
 
 # ---- unknowns, bounds and sides -------------------------------------------------------------------------------
@@ -246,7 +242,15 @@ def _conic(task: Task, rows: Rows) -> Optimum | None:
     bounded = np.isfinite(right)
     if bounded.any():
         blocks.append((clarabel.NonnegativeConeT(int(bounded.sum())), bounds[bounded], right[bounded]))
-    blocks += [_side(task, int(k), columns) for k in rows]
+    for k in rows.tolist():  # (1 − linear·t, K (spread ∘ t)) in a cone, or its first component ≥ 0 alone
+        across = np.diag(task.spread[k]) if task.factor is None else task.factor * task.spread[k]
+        across = across[np.any(across != 0, axis=1)]
+        weights = np.vstack([task.linear[k], -across])
+        block = np.zeros((len(weights), columns))
+        block[:, :count] = weights @ (task.spans * task.unit)
+        right = np.append(1.0, np.zeros(len(across))) - weights @ task.base
+        cone = clarabel.SecondOrderConeT(len(right)) if len(across) else clarabel.NonnegativeConeT(1)
+        blocks.append((cone, block, right))
     firsts = np.cumsum([0, *(len(right) for _, _, right in blocks)])[len(blocks) - len(rows) : -1]
     shares = np.zeros(columns)
     for place, (g, cost) in enumerate(task.costs, count):
@@ -283,17 +287,6 @@ def _conic(task: Task, rows: Rows) -> Optimum | None:
     varying, bound = task.cost(u) - constant, scale * float(solution.obj_val_dual)
     gap = max(varying - bound, 0.0) / (varying or 1.0)
     return Optimum(u, rows[active], multipliers[active], constant + min(bound, varying), gap)
-
-
-def _side(task: Task, k: int, columns: int) -> tuple[Any, Array, Array]:
-    """The cone of one side: (1 − linear·t, K (spread ∘ t)), or its first component ≥ 0 alone."""
-    across = np.diag(task.spread[k]) if task.factor is None else task.factor * task.spread[k]
-    across = across[np.any(across != 0, axis=1)]
-    weights = np.vstack([task.linear[k], -across])
-    block = np.zeros((len(weights), columns))
-    block[:, : len(task.unit)] = weights @ (task.spans * task.unit)
-    right = np.append(1.0, np.zeros(len(across))) - weights @ task.base
-    return clarabel.SecondOrderConeT(len(right)) if len(across) else clarabel.NonnegativeConeT(1), block, right
 
 
 # ---- options of which one is taken ----------------------------------------------------------------------------

@@ -32,11 +32,19 @@ from trunnion.model.fields import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
-from trunnion.studies.tolerance.effects import NOBODY, EffectRow, Effects, FirstOrder, Spread, effects_of
+from trunnion.studies.tolerance.effects import (
+    NOBODY,
+    Corner,
+    EffectRow,
+    Effects,
+    FirstOrder,
+    Spread,
+    effects_of,
+    search,
+)
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import engine_for, kernel_of, many_of
 from trunnion.studies.tolerance.sampling import PLACES, Sampling, towards
-from trunnion.studies.tolerance.search import Corner, search
 
 __all__ = [
     "MeasureOrder",
@@ -117,9 +125,8 @@ class MeasureOrder:
         if not self.is_deviation:
             return max(lower, least - self.nominal), min(upper, most - self.nominal)
         if measure.kind != "path_error" and rule in ("maximum", "minimum", "mean"):
-            return -np.inf if rule == "maximum" else max(lower, least), np.inf if rule == "minimum" else min(
-                upper, most
-            )
+            ends = max(lower, least), min(upper, most)
+            return -np.inf if rule == "maximum" else ends[0], np.inf if rule == "minimum" else ends[1]
         return -min(upper, most), min(upper, most)  # what has a size and no sign
 
 

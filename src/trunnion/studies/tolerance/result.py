@@ -406,15 +406,10 @@ def limits_of(measure: Measure, nominal: float) -> tuple[float, float]:
     """Least and largest figure within limits and bounds; ±∞ where there is none."""
     low = -np.inf if measure.at_least is None else measure.at_least
     high = np.inf if measure.at_most is None else measure.at_most
+    lower, upper = measure.lower, measure.upper
     if measure.rule == "deviation":
-        if measure.lower is not None and measure.upper is not None:
-            high = min(high, min(-measure.lower, measure.upper))
-        return low, high
-    if measure.lower is not None:
-        low = max(low, nominal + measure.lower)
-    if measure.upper is not None:
-        high = min(high, nominal + measure.upper)
-    return low, high
+        return low, high if lower is None or upper is None else min(high, -lower, upper)
+    return low if lower is None else max(low, nominal + lower), high if upper is None else min(high, nominal + upper)
 
 
 def _bands(samples: Samples, study: ToleranceStudy, table: Table) -> Array:

@@ -244,13 +244,13 @@ def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
         points[rows] = two[rows]
         mixed[i] = analysed(points)
     lost = int(sum(np.count_nonzero(np.any(np.isnan(y), axis=0)) for y in (y_one, y_two, *mixed)))
-    shares_of = _indices(_filled(y_one), _filled(y_two), _filled(mixed), seed, lost)
-    for shares in shares_of.arrays.values():  # of a measure without a single answer
+    arrays = _indices(_filled(y_one), _filled(y_two), _filled(mixed), seed)
+    for shares in arrays.values():  # of a measure without a single answer
         shares[np.all(np.isnan(y_one) & np.isnan(y_two), axis=1)] = np.nan
-    return shares_of
+    return Indices(arrays, lost)
 
 
-def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> Indices:
+def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int) -> dict[str, Array]:
     """Both orders with percentile intervals: scipy's own bootstrap cannot be given a seed."""
     from scipy.stats import sobol_indices  # takes longer to import than the rest
 
@@ -270,14 +270,11 @@ def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> 
         drawn = np.array([both(rng.integers(base, size=base)) for _ in range(BOOTSTRAPS)])
         low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0)
     ends = ("", index), ("_low", low), ("_high", high)
-    return Indices(
-        {
-            f"{order}_order{name}": np.where(np.isnan(end[k]), index[k], end[k])  # the index where nothing scatters
-            for k, order in enumerate(("first", "total"))
-            for name, end in ends
-        },
-        lost,
-    )
+    return {
+        f"{order}_order{name}": np.where(np.isnan(end[k]), index[k], end[k])  # the index where nothing scatters
+        for k, order in enumerate(("first", "total"))
+        for name, end in ends
+    }
 
 
 def _filled(y: Array) -> Array:

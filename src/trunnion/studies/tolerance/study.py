@@ -93,7 +93,7 @@ def tolerance(
     MechanismError
         Nothing varies, a measure or method is unknown, or as `analyse` does.
     """
-    methods, notes = tuple(dict.fromkeys(methods)), list[Finding]()
+    methods, trouble = tuple(dict.fromkeys(methods)), list[Finding]()
     _check(methods, samples, seed, target)
     check_steps(steps)
     prepared = study(mechanism, measures, at, friction_method)
@@ -102,16 +102,12 @@ def tolerance(
     if (method := next((sampling for sampling in methods if sampling in SAMPLINGS), None)) is not None:
         # the workers of a cluster may have no other
         job = prepared.sampling(method, samples, seed, "numpy" if cluster and engine == "auto" else engine, steps)
-        if engine == "auto" and job.engine != "numpy":
-            what = f"the samples are computed by the engine {job.engine}"
-            notes.append(Finding.note("samples.engine", "samples", what, engine=job.engine))
         drawn, trouble = sample(job, jobs, cluster, checkpoint, progress)
-        notes += trouble
     if "sobol" in methods:
         # each number is to have its own coordinates of the points
         plain = replace(prepared.sampling("quasi-monte-carlo", samples, seed, engine), rotation=None)
         shares = indices(plain.prepare(), samples, seed)
-    return dataset(Outcome(prepared, steps, tuple(methods), worst, drawn, shares, target), [*prepared.notes, *notes])
+    return dataset(Outcome(prepared, steps, tuple(methods), worst, drawn, shares, target), [*prepared.notes, *trouble])
 
 
 def sample(

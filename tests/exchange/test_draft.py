@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import trunnion
-from trunnion.exchange.draft import Body, Draft, Pair, moved, steiner
+from trunnion.exchange.draft import Body, Draft, Pair, moved, positions_of, steiner
 from trunnion.exchange.formats import FORMATS
 from trunnion.exchange.model_file import complete, model_text
-from trunnion.exchange.skeleton import positions_of
 from trunnion.model.mechanism import Mechanism
 
 

@@ -15,7 +15,7 @@ import pytest
 import trunnion
 from mechanisms import DURANGO
 from trunnion.exchange import export_model, import_file
-from trunnion.exchange.skeleton import positions_of
+from trunnion.exchange.draft import positions_of
 from trunnion.model.mechanism import Mechanism
 
 EXAMPLES = DURANGO.parent

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import trunnion
 from trunnion.exchange import Draft, export_model, import_file
-from trunnion.exchange.skeleton import positions_of
+from trunnion.exchange.draft import positions_of
 from trunnion.model.mechanism import Mechanism
 
 BOX = np.array([40.0, 20.0, 10.0])

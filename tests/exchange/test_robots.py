@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import trunnion
 from trunnion.exchange import export_model, import_file, model_text
-from trunnion.exchange.skeleton import positions_of
+from trunnion.exchange.draft import positions_of
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 

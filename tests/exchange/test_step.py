@@ -23,9 +23,8 @@ from exchange.step_mechanisms import STILL, bar, boss, cardan, four_bar, placed,
 from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model, import_file, model_text
-from trunnion.exchange.brep import Geometry, mass_of
-from trunnion.exchange.part21 import Part21
-from trunnion.exchange.skeleton import positions_of
+from trunnion.exchange.brep import Geometry, Part21, mass_of
+from trunnion.exchange.draft import positions_of
 from trunnion.exchange.step_assembly import Assembly
 
 STEEL = 7850.0

@@ -22,8 +22,7 @@ from ezdxf.math import Vec3
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Draft, Pair
-from trunnion.exchange.skeleton import Positions, positions_of
+from trunnion.exchange.draft import Array, Draft, Pair, Positions, positions_of
 from trunnion.solve.backward import Backward, gear_load
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import springs, stated_loads

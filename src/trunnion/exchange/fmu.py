@@ -31,7 +31,7 @@ from pythonfmu3 import (
 from trunnion.dynamics.result import Books
 from trunnion.dynamics.simulate import Continued
 from trunnion.errors import Finding, MechanismError, Severity, counted
-from trunnion.exchange.skeleton import Positions
+from trunnion.exchange.draft import Positions
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import read_mechanism
 

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, few, refused
+from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, few, positions_of, refused
 from trunnion.exchange.model_file import complete
-from trunnion.exchange.skeleton import positions_of
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity

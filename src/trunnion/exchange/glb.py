@@ -15,8 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Array, Draft, Pair, perpendicular
-from trunnion.exchange.skeleton import Positions
+from trunnion.exchange.draft import Array, Draft, Pair, Positions, perpendicular
 from trunnion.version import __version__
 
 __all__ = ["write"]

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, Place, refused, steiner, united
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, Place, Positions, refused, steiner, united
 from trunnion.exchange.robots import (
     APART,
     WORLD,
@@ -31,7 +31,6 @@ from trunnion.exchange.robots import (
     unit,
     written,
 )
-from trunnion.exchange.skeleton import Positions
 from trunnion.joints.pairs import PAIRS
 
 __all__ = ["read", "write"]

@@ -20,13 +20,13 @@ from trunnion.exchange.draft import (
     Body,
     Draft,
     Pair,
+    Positions,
     components,
     few,
     free_name,
     perpendicular,
     refused,
 )
-from trunnion.exchange.skeleton import Positions
 
 __all__ = ["Scene", "laid_out", "numbers", "opening", "parsed", "spanning", "stem", "steps", "tensor",
            "text_of", "turned", "unit", "written"]  # fmt: skip

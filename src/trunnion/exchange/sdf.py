@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, ImportOptions, Pair, Place, refused
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, ImportOptions, Pair, Place, Positions, refused
 from trunnion.exchange.robots import (
     APART,
     WORLD,
@@ -30,7 +30,6 @@ from trunnion.exchange.robots import (
     unit,
     written,
 )  # fmt: skip
-from trunnion.exchange.skeleton import Positions
 
 __all__ = ["read", "read_urdf", "write", "write_urdf"]
 

@@ -18,15 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.brep import Face, Solid, mass_of, moments_of, moved
+from trunnion.exchange.brep import Face, Part21, Solid, mass_of, moments_of, moved, quoted
 from trunnion.exchange.draft import MATERIALS, Array, Body, Draft, ImportOptions, Place, free_name, refused
 from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
-from trunnion.exchange.part21 import Part21, quoted
 from trunnion.exchange.step_assembly import Assembly, Occurrence
 
 if TYPE_CHECKING:
-    from trunnion.exchange.skeleton import Positions
+    from trunnion.exchange.draft import Positions
 
 __all__ = ["read", "write", "write_moved"]
 
@@ -360,15 +359,13 @@ def write_moved(positions: Positions, path: Path, original: Path) -> list[Findin
         elif np.abs(move.matrix - np.eye(3)).max() > FIT or np.abs(move.shift).max() > FIT:
             what = f"has no placement of its own in {original.name!r}"
             raise MechanismError(Finding(what, f"links.{name}", "export the parts from CAD as an assembly"))
-    pieces, at = [], 0
-    for number in sorted(changes, key=lambda number: file.spans[number]):
+    changed = file.text
+    for number in sorted(changes, key=lambda number: -file.spans[number][0]):  # from the end: earlier places stay
         start, end = file.spans[number]
-        pieces += [file.text[at:start], changes[number]]
-        at = end
-    rest = file.text[at:]
-    close = rest.rindex("ENDSEC")
+        changed = changed[:start] + changes[number] + changed[end:]
+    data, _, rest = changed.rpartition("ENDSEC")
     added = "\n".join(text.lines)
-    path.write_text("".join(pieces) + rest[:close] + added + "\n" + rest[close:], encoding="utf-8")
+    path.write_text(f"{data}{added}\nENDSEC{rest}", encoding="utf-8")
     return []
 
 

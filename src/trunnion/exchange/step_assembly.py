@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.exchange.brep import Geometry, Solid
+from trunnion.exchange.brep import Geometry, Part21, Ref, Solid
 from trunnion.exchange.draft import Place, few, refused
-from trunnion.exchange.part21 import Part21, Ref
 
 __all__ = ["Assembly", "Occurrence"]
 

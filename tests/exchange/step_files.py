@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
 
 UNITS = {"mm": 1e-3, "in": 25.4e-3, "m": 1.0}
 
@@ -27,9 +28,7 @@ def frame_of(axis, x=None):
 
 def turn(axis, angle):
     """Rotation matrix about an axis."""
-    x, y, z = np.array(axis, float) / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return Rotation.from_rotvec(angle * np.array(axis, float) / np.linalg.norm(axis)).as_matrix()
 
 
 @dataclass
@@ -113,12 +112,11 @@ def prism(polygon, low, high, split="seam"):
     for i in range(len(polygon)):
         j = (i + 1) % len(polygon)
         flat(i, [bottom[i], bottom[j], top[j], top[i]])
-    area, plane_first, plane_second = 0.0, np.zeros(2), np.zeros((2, 2))
-    for a, b in zip(np.array(polygon, float), np.roll(np.array(polygon, float), -1, axis=0), strict=True):
-        cross = a[0] * b[1] - a[1] * b[0]
-        area += cross / 2
-        plane_first += cross * (a + b) / 6
-        plane_second += cross * (2 * np.outer(a, a) + 2 * np.outer(b, b) + np.outer(a, b) + np.outer(b, a)) / 24
+    a = np.array(polygon, float)
+    b = np.roll(a, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area, plane_first = cross.sum() / 2, cross @ (a + b) / 6
+    plane_second = ((cross * (a + b).T) @ (a + b) + (cross * a.T) @ a + (cross * b.T) @ b) / 24
     z1, z2, z3 = high - low, (high**2 - low**2) / 2, (high**3 - low**3) / 3
     second = np.zeros((3, 3))
     second[:2, :2] = plane_second * z1
@@ -210,10 +208,7 @@ def _swept(split, origin, frame, start, end, centre):
         normal = -across if (turns > 0) == up else across  # e_r turns to z about -e_u
         return ("arc", at(centre[0], centre[1], angle), normal, math.hypot(r1 - centre[0], z1 - centre[1]), *ends)
 
-    if z1 == z2 and centre is None:
-        circles = [_circle(origin, axis, r, z, s) for r, z, s in ((r1, z1, 1), (r2, z2, -1)) if r > 0]
-        return [{"surface": surface, "sense": sense, "loops": [[circle] for circle in circles]}]
-    if split == "none":
+    if split == "none" or (z1 == z2 and centre is None):
         circles = [_circle(origin, axis, r, z, s) for r, z, s in ((r1, z1, 1), (r2, z2, -1)) if r > 0]
         return [{"surface": surface, "sense": sense, "loops": [[circle] for circle in circles]}]
     if split == "seam":

@@ -16,17 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from pythonfmu3 import (
-    Float64,
-    Fmi3Causality,
-    Fmi3Initial,
-    Fmi3Slave,
-    Fmi3Status,
-    Fmi3StepResult,
-    Fmi3Variability,
-    FmuBuilder,
-    Unit,
-)  # fmt: skip
+import pythonfmu3 as fmi
+from pythonfmu3 import Fmi3Slave, Unit
 
 from trunnion.dynamics.result import Books
 from trunnion.dynamics.simulate import Continued
@@ -50,7 +41,7 @@ def write(positions: Positions, path: Path) -> list[Finding]:
     with TemporaryDirectory() as folder:
         model = Path(folder) / MODEL
         positions.mechanism.write(model)
-        shutil.copyfile(FmuBuilder.build_FMU(Path(__file__), folder, [model]), path)
+        shutil.copyfile(fmi.FmuBuilder.build_FMU(Path(__file__), folder, [model]), path)
     what = f"the unit has {counted(len(motion.inputs), 'input')}, holds the model file and runs where Python has "
     what += "trunnion installed, on Linux and Windows on x86-64"
     return [Finding.weighed(Severity.NOTE, "exchange.fmu_needs", "", what, "pip install 'trunnion[cad]' there")]
@@ -68,13 +59,13 @@ class Linkage(Fmi3Slave):  # type: ignore[misc]
         motion = self.motion = Continued(self.mechanism)
         self.parameters = dict(self._parameters())
         self.values = {"time": 0.0, **self.parameters, **motion.inputs}
-        self._add("time", "time", "s", Fmi3Causality.independent)
+        self._add("time", "time", "s", fmi.Fmi3Causality.independent)
         for path in self.parameters:
-            self._add(path, path, self._unit(path), Fmi3Causality.parameter)
+            self._add(path, path, self._unit(path), fmi.Fmi3Causality.parameter)
         for path in motion.inputs:
-            self._add(path, path, self._unit(path), Fmi3Causality.input)
+            self._add(path, path, self._unit(path), fmi.Fmi3Causality.input)
         for name, text, unit, _ in self._outputs(motion.now()):
-            self._add(name, text, unit, Fmi3Causality.output)
+            self._add(name, text, unit, fmi.Fmi3Causality.output)
 
     def _parameters(self) -> Iterator[tuple[str, float]]:
         """What others may set before the motion begins, by path, with what the model says."""
@@ -123,13 +114,13 @@ class Linkage(Fmi3Slave):  # type: ignore[misc]
         name = ".".join(words)
         if any(name == variable.name for variable in self.vars.values()):
             name += f"_{len(self.vars)}"
-        fixed = causality == Fmi3Causality.parameter
+        fixed = causality == fmi.Fmi3Causality.parameter
         self.register_variable(
-            Float64(
+            fmi.Float64(
                 name,
                 causality=causality,
-                variability=Fmi3Variability.fixed if fixed else Fmi3Variability.continuous,
-                initial=Fmi3Initial.calculated if causality == Fmi3Causality.output else None,
+                variability=fmi.Fmi3Variability.fixed if fixed else fmi.Fmi3Variability.continuous,
+                initial=fmi.Fmi3Initial.calculated if causality == fmi.Fmi3Causality.output else None,
                 description=text,
                 unit=unit or None,
                 getter=lambda: self.values[key],
@@ -148,21 +139,21 @@ class Linkage(Fmi3Slave):  # type: ignore[misc]
         try:
             self.motion = Continued(self.mechanism.with_values(changed) if changed else self.mechanism)
         except MechanismError as error:
-            self.log(str(error), Fmi3Status.error)
+            self.log(str(error), fmi.Fmi3Status.error)
             raise
         self.motion.inputs.update({path: self.values[path] for path in self.motion.inputs})
         self.values.update({name: value for name, _, _, value in self._outputs(self.motion.now())})
 
-    def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
+    def do_step(self, current_time: float, step_size: float) -> fmi.Fmi3StepResult:
         """Go on by a step, s; where the motion ends, ask for the end of the simulation."""
         motion, time = self.motion, current_time + step_size
         inputs = {path: self.values[path] for path in motion.inputs}
         if not all(map(math.isfinite, inputs.values())):
-            self.log("an input is no finite number", Fmi3Status.error)
-            return Fmi3StepResult(status=Fmi3Status.error)
+            self.log("an input is no finite number", fmi.Fmi3Status.error)
+            return fmi.Fmi3StepResult(status=fmi.Fmi3Status.error)
         motion.inputs.update(inputs)
         self.values.update({name: value for name, _, _, value in self._outputs(motion.advance(time - self.begin))})
         self.values["time"] = time if motion.ended is None else self.begin + motion.time
         if motion.ended is not None:
-            self.log(str(motion.ended), Fmi3Status.warning)
-        return Fmi3StepResult(status=Fmi3Status.ok, terminateSimulation=motion.ended is not None)
+            self.log(str(motion.ended), fmi.Fmi3Status.warning)
+        return fmi.Fmi3StepResult(status=fmi.Fmi3Status.ok, terminateSimulation=motion.ended is not None)

@@ -188,23 +188,19 @@ def _overlaps(rounds: Sequence[Round], widest: float) -> Iterator[Contact]:
     """Pins in holes of other bodies whose radius exceeds theirs by at most `widest`, or balls in sockets."""
     holes = [item for item in rounds if item.hole and item.covered >= COVERED[1]]
     points, axes = (np.array([getattr(hole, key) for hole in holes]).reshape(-1, 3) for key in ("point", "axis"))
-    radii = np.array([hole.radius for hole in holes])
+    radii, lows, highs = (np.array([getattr(hole, key) for hole in holes]) for key in ("radius", "low", "high"))
     for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
-        off, ball = points - pin.point, pin.low == pin.high
-        away = off if ball else off - (off @ pin.axis)[:, None] * pin.axis
-        near = np.linalg.norm(away, axis=1) <= abs(radii - pin.radius) + NEAR + ANGLE * np.linalg.norm(off, axis=1)
-        near &= (radii - pin.radius <= widest) & (ball | (abs(axes @ pin.axis) > 1 - ANGLE))
-        for hole in (holes[index] for index in np.nonzero(near)[0] if holes[index].body != pin.body):
-            off, play = pin.point - hole.point, abs(hole.radius - pin.radius) + NEAR
-            if ball:
-                if np.linalg.norm(off) <= play:
-                    yield Contact(pin, hole, 0.0, 0.0)
-            elif parallel(pin.axis, hole.axis):
-                shift, sign = float(off @ hole.axis), float(np.sign(pin.axis @ hole.axis))
-                ends = sorted((shift + sign * pin.low, shift + sign * pin.high))
-                low, high = max(ends[0], hole.low), min(ends[1], hole.high)
-                if high - low >= NEAR and np.linalg.norm(off - shift * hole.axis) <= play:
-                    yield Contact(pin, hole, low, high)
+        off, ball = pin.point - points, pin.low == pin.high
+        shift = np.zeros(len(holes)) if ball else (off * axes).sum(axis=1)
+        aside = np.linalg.norm(off - shift[:, None] * axes, axis=1)
+        turned = np.linalg.norm(np.cross(axes, pin.axis), axis=1)
+        ends = shift + np.outer([pin.low, pin.high], np.sign(axes @ pin.axis))
+        low, high = np.maximum(ends.min(axis=0), lows), np.minimum(ends.max(axis=0), highs)
+        fits = (radii - pin.radius <= widest) & (aside <= abs(radii - pin.radius) + NEAR)
+        fits &= ball | ((turned < ANGLE) & (high - low >= NEAR))
+        for hole, start, end in ((holes[k], float(low[k]), float(high[k])) for k in np.nonzero(fits)[0]):
+            if hole.body != pin.body:
+                yield Contact(pin, hole, start, end)
 
 
 def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:

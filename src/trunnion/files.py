@@ -55,11 +55,9 @@ class _Run:
 
     def findings(self, path: Path, targets: Sequence[Target]) -> list[Finding]:
         """Which targets an input would be lost to."""
-        lost = [
-            target for target in targets if same(target.path, path) and not (target.over and same(target.over, path))
-        ]
         return [Finding(f"{_called(target.path, path)} is read here, and would be written over"
-                        + f" by {target.option}" * bool(target.option), "", REMEDY) for target in lost]  # fmt: skip
+                        + f" by {target.option}" * bool(target.option), "", REMEDY) for target in targets
+                if same(target.path, path) and not (target.over and same(target.over, path))]  # fmt: skip
 
 
 def _called(written: Path, read: Path) -> str:
@@ -73,11 +71,8 @@ _RUN: ContextVar[_Run | None] = ContextVar("run", default=None)
 @contextmanager
 def writing(targets: Sequence[Target]) -> Iterator[None]:
     """A run that writes these; MechanismError if two are one file, or, while it lasts, if one is read."""
-    findings = [
-        Finding(f"{_called(two.path, first.path)} is written by {first.option} already", two.option, REMEDY)
-        for first, two in combinations(targets, 2)
-        if same(first.path, two.path)
-    ]
+    findings = [Finding(f"{_called(two.path, first.path)} is written by {first.option} already", two.option, REMEDY)
+                for first, two in combinations(targets, 2) if same(first.path, two.path)]  # fmt: skip
     if findings:
         raise MechanismError(findings)
     before = _RUN.set(_Run(targets))

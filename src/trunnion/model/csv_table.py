@@ -18,6 +18,7 @@ import io
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path, PureWindowsPath
 from typing import Any, NamedTuple
 
@@ -123,12 +124,10 @@ def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
     holders = [(section, key) for section in parts for key in parts[section] if name in (key, f"{section}.{key}")]
     if len(holders) == 1:
         return holders[0]
-    what, remedy = f"'{name}' is a driver and a table", f"say drivers.{name} or tables.{name}"
-    if not holders:
-        what, remedy = (
-            f"there is no driver or table '{name}'",
-            nearest(name, [key for part in parts.values() for key in part]),
-        )
+    if holders:
+        what, remedy = f"'{name}' is a driver and a table", f"say drivers.{name} or tables.{name}"
+    else:
+        what, remedy = f"there is no driver or table '{name}'", nearest(name, [*chain.from_iterable(parts.values())])
     raise MechanismError(Finding(what, remedy=remedy))
 
 
@@ -157,11 +156,10 @@ def _points(
     if names:  # of another program, which writes numbers of SI without their unit
         plain = (KINDS["time"], KINDS["angle"], KINDS["length"])
         units = [text or kind.unit * (kind in plain) for text, kind in zip(units, kinds, strict=True)]
-    points: list[list[float | str]] = [
-        [f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)]
-        for _, cells in rows
-    ]
-    return TablePoints(where, label, points, [line for line, _ in rows])
+    points = TablePoints(where, label, [], [line for line, _ in rows])
+    for _, cells in rows:
+        points.rows.append([f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)])
+    return points
 
 
 def column(path: Path, kind: Kind) -> list[float]:
@@ -373,11 +371,8 @@ _HEADING = re.compile(
 
 def numbered(lines: Iterable[str]) -> list[tuple[int, str]]:
     """The lines that are neither empty nor comments, by their numbers from 1."""
-    return [
-        (number, line.rstrip("\n"))
-        for number, line in enumerate(lines, start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    return [(number, line.rstrip("\n")) for number, line in enumerate(lines, start=1)
+            if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
 
 
 def separator_of(line: str, usual: str = ",") -> str:

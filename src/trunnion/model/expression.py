@@ -9,6 +9,7 @@ standard library's `ast` over a whitelist of nodes: nothing of the text is ever 
 from __future__ import annotations
 
 import ast
+import operator as operators
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -219,12 +220,9 @@ def _depth(tree: ast.expr) -> int:
 # ---- a tree, compiled -----------------------------------------------------------------------------------------
 
 _OPERATORS: Mapping[type[ast.operator], Callable[[Number, Number], Number]] = {
-    ast.Add: lambda a, b: a + b,
-    ast.Sub: lambda a, b: a - b,
-    ast.Mult: lambda a, b: a * b,
-    ast.Div: lambda a, b: a / b,
-    ast.Pow: lambda a, b: a**b,
-}
+    ast.Add: operators.add, ast.Sub: operators.sub, ast.Mult: operators.mul, ast.Div: operators.truediv,
+    ast.Pow: operators.pow,
+}  # fmt: skip
 
 
 def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Term:

@@ -95,21 +95,16 @@ class Fields(Part):
         pins = [self.joint_defaults.pin, *(joint.pin for joint in self.stated_joints.values())]
         named = any(pin and pin.fit and pin.fit.size.names for pin in pins)
         sizes = nominal_dimensions(self.dimensions) if named else {}
-        return ReadOnlyDict(
-            {
-                name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
-                for name, joint in self.stated_joints.items()
-            }
-        )
+        return ReadOnlyDict({name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
+                             for name, joint in self.stated_joints.items()})  # fmt: skip
 
     @cached_property
     def points(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the points of every link; a joint of the loop is a point of both its links."""
         rows = [row.joint for row in self.loop]
         ends = {name: [row for row in rows if name in self.stated_joints[row].links] for name in self.effective_links}
-        return ReadOnlyDict(
-            {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
-        )
+        return ReadOnlyDict({name: tuple(dict.fromkeys([*link.points, *ends[name]]))
+                             for name, link in self.effective_links.items()})  # fmt: skip
 
     def named(self, noun: str) -> list[str]:
         """The names of the parts that a noun means: `link`, `point` (link.point), `joint` that moves, `driver` …"""

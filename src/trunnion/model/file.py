@@ -276,20 +276,16 @@ class _Builder:
 def place(findings: Iterable[Finding], file: str, lines: Lines, data: Mapping[str, Any]) -> list[Finding]:
     """Findings with their file and line, in the order of the file."""
     rows = _rows(data)
-    placed = [
-        finding if finding.file else finding.at(file, finding.line or _line(finding.where, lines, rows))
-        for finding in findings
-    ]
+    placed = [finding if finding.file else finding.at(file, finding.line or _line(finding.where, lines, rows))
+              for finding in findings]  # fmt: skip
     return sorted(placed, key=lambda finding: (finding.file != file, finding.file, finding.line or 0))
 
 
 def _rows(data: Mapping[str, Any]) -> dict[str, str]:
     """Where the rows of the loop stand, by the paths that findings have for them: loop.JOINT and joints.JOINT."""
     stated = data.get("loop")
-    joints = [
-        row.get("joint") if isinstance(row, dict) else None for row in (stated if isinstance(stated, list) else ())
-    ]
-    names = [(name, f"loop.{index}") for index, name in enumerate(joints) if name is not None]
+    names = [(row["joint"], f"loop.{index}") for index, row in enumerate(stated if isinstance(stated, list) else ())
+             if isinstance(row, dict) and row.get("joint") is not None]  # fmt: skip
     return {f"{section}.{name}": row for name, row in names for section in ("loop", "joints")}
 
 

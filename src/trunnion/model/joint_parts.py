@@ -327,9 +327,9 @@ def has_play(joint: Joint) -> bool:
         return False
     if joint.pair.guided:
         return guide is not None and guide.clearance is not None
-    return pin is not None and (
-        pin.clearance is not None or pin.end_float is not None or bool(pin.radius and pin.hole_radius)
-    )
+    if pin is None:
+        return False
+    return pin.clearance is not None or pin.end_float is not None or bool(pin.radius and pin.hole_radius)
 
 
 def clearance(name: str, values: Mapping[str, Number]) -> Number | None:

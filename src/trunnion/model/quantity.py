@@ -95,21 +95,16 @@ class Quantity:
         if self.expression is None:
             return None
         kind = kind or self.kind
-        dimension = self.expression.dimension(names)
+        needed, dimension = kind.with_article, self.expression.dimension(names)
         if self.expression.bare and dimension is not None and kind.dimensions and NUMBER not in kind.dimensions:
             if self.evaluate() == 0:
                 return None
-            raise UnitError(
-                f"'{self.source}' has no unit where {_needed(kind)} is needed",
-                f"write a unit, such as {kind.example}, or a plain number in {kind.unit}",
-            )
+            remedy = f"write a unit, such as {kind.example}, or a plain number in {kind.unit}"
+            raise UnitError(f"'{self.source}' has no unit where {needed} is needed", remedy)
         if not kind.accepts(dimension):
             assert dimension is not None  # None fits every kind
-            raise UnitError(
-                f"'{self.source}' is {dimension_text(dimension)} where {_needed(kind)} is needed",
-                f"write {_needed(kind)} such as {kind.example}"
-                + ("; a percentage of another value is not read" if "%" in str(self.source) else ""),
-            )
+            what = f"'{self.source}' is {dimension_text(dimension)} where {needed} is needed"
+            raise UnitError(what, f"write {needed} such as {kind.example}")
         return dimension
 
 
@@ -132,18 +127,13 @@ def _read_text(text: str, kind: Kind) -> tuple[tuple[float, float] | None, Expre
     return tolerance, expression
 
 
-def _needed(kind: Kind) -> str:
-    return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
-
-
 def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
     if match := _SYMMETRIC.match(text):
         main, parts = match[1], [match[2]]
         if not main.strip():
-            raise UnitError(
-                f"'{text}' is a tolerance without a value", f"write 60 mm {text}, or tolerances: {{NAME: {text}}}"
-            )
+            remedy = f"write 60 mm {text}, or tolerances: {{NAME: {text}}}"
+            raise UnitError(f"'{text}' is a tolerance without a value", remedy)
     elif match := _LIMITS.match(text):
         main, parts = match[1], [match[2], match[3]]
     else:
@@ -162,16 +152,14 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     deviations = []
     for number, shares in terms:
         deviation = literal(number.lstrip("-+"), shares or unit)
+        what = f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}"
         if found_dimension is not None and not (
             fits(deviation.dimension, found_dimension) and fits(found_dimension, deviation.dimension)
         ):
-            raise UnitError(
-                f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}, "
-                f"the value {dimension_text(found_dimension)}",
-                "give both the same unit",
-            )
+            other = dimension_text(found_dimension)
+            raise UnitError(f"{what}, the value {other}", "give both the same unit")
         if (shares or unit) and not kind.accepts(deviation.dimension):
-            raise UnitError(f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}")
+            raise UnitError(what)
         deviations.append(-deviation.value if number.startswith("-") else deviation.value)
     if len(deviations) == 1:
         if terms[0][0][0] in "-+":
@@ -248,11 +236,9 @@ def evaluation_order(
 
     errors: deviations of some of them, which may speak of dimensions too.
     """
-    graph = {
-        name: {operand for operand in quantity.names if operand in dimensions} for name, quantity in dimensions.items()
-    }
-    for name, quantity in (errors or {}).items():
-        graph[name] |= {operand for operand in quantity.names if operand in dimensions}
+    graph: dict[str, set[str]] = {name: set() for name in dimensions}
+    for name, quantity in (*dimensions.items(), *(errors or {}).items()):
+        graph[name] |= dimensions.keys() & quantity.names
     circles: list[list[str]] = []
     while True:
         try:

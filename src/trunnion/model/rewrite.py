@@ -121,9 +121,8 @@ def _edits(text: str, node: Any, before: Any, after: Any) -> Iterator[Edit]:
         return
     indent = "\n" + " " * node.start_mark.column
     inline = isinstance(node, ScalarNode) or node.flow_style or not isinstance(after, Mapping | list)
-    new = (
-        _flow(after, quoted=bool(getattr(node, "style", None))) if inline else indent.join(text_of(after).splitlines())
-    )
+    style = bool(getattr(node, "style", None))
+    new = _flow(after, quoted=style) if inline else indent.join(text_of(after).splitlines())
     yield node.start_mark.index, _last(node).end_mark.index, new
 
 
@@ -146,12 +145,9 @@ def _removed(text: str, parent: MappingNode, place: int) -> Edit:
     """An entry taken out of a group that has others."""
     key, node = parent.value[place]
     if parent.flow_style:
-        begin, end = (
-            (key.start_mark, parent.value[1][0].start_mark)
-            if place == 0
-            else (parent.value[place - 1][1].end_mark, node.end_mark)
-        )
-        return begin.index, end.index, ""
+        if place == 0:
+            return key.start_mark.index, parent.value[1][0].start_mark.index, ""
+        return parent.value[place - 1][1].end_mark.index, node.end_mark.index, ""
     end = text.find("\n", _last(node).end_mark.index) + 1
     return text.rfind("\n", 0, key.start_mark.index) + 1, end or len(text), ""
 

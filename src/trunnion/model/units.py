@@ -66,15 +66,15 @@ class Kind:
     dimensions: tuple[Dimension, ...] = field(repr=False, hash=False)  # fractions are slow to hash
     either: tuple[Kind, ...] = field(default=(), repr=False, hash=False)
 
+    @property
+    def with_article(self) -> str:
+        """Its name as a message has it: a length, an angle."""
+        return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name}"
+
     def __or__(self, other: Kind) -> Kind:
         """A quantity that may be either, until its place says which."""
-        return Kind(
-            f"{self.name} or {other.name}",
-            f"{self.unit} or {other.unit}",
-            self.example,
-            self.dimensions + other.dimensions,
-            (self, other),
-        )
+        name, unit = f"{self.name} or {other.name}", f"{self.unit} or {other.unit}"
+        return Kind(name, unit, self.example, self.dimensions + other.dimensions, (self, other))
 
     def of(self, turns: bool) -> Kind:
         """Which of two it is, of what turns or of what slides."""
@@ -82,9 +82,7 @@ class Kind:
 
     def accepts(self, dimension: Dimension | None) -> bool:
         """Whether a value of this dimension (None: a plain number, unknown) can stand here."""
-        return (
-            dimension is None or not self.dimensions or any(fits(dimension, accepted) for accepted in self.dimensions)
-        )
+        return dimension is None or not self.dimensions or any(fits(dimension, other) for other in self.dimensions)
 
 
 TURNING = ("angle", "angular speed", "moment", "moment of inertia", "torsional stiffness", "torsional damping")
@@ -133,7 +131,7 @@ def dimension_text(dimension: Dimension) -> str:
     """A dimension in words: `a length`, `an angle`, else its SI unit."""
     for kind in KINDS.values():
         if dimension in kind.dimensions:
-            return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"
+            return kind.with_article
     symbols = zip(("m", "kg", "s", "rad"), dimension, strict=True)
     parts = [name if power == 1 else f"{name}^{power}" for name, power in symbols if power]
     return f"in {' '.join(parts)}"

@@ -124,9 +124,8 @@ def codes(what: str, of: type[IntEnum]) -> dict[str, str]:
 def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings for JSON."""
     keys = ("severity", "where", "what", "remedy", "code")
-    return [
-        {key: str(getattr(finding, key)) for key in keys} | {"figures": plain(finding.figures)} for finding in findings
-    ]
+    return [{key: str(getattr(finding, key)) for key in keys} | {"figures": plain(finding.figures)}
+            for finding in findings]  # fmt: skip
 
 
 def plain(value: Any) -> Any:
@@ -149,9 +148,8 @@ def whole(result: Described, what: str) -> None:
 
 def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes as files can hold them: lists and dicts as JSON."""
-    return {
-        name: _AS_TEXT(value) if isinstance(value, (list, tuple, dict)) else value for name, value in attributes.items()
-    }
+    return {name: _AS_TEXT(value) if isinstance(value, list | tuple | dict) else value
+            for name, value in attributes.items()}  # fmt: skip
 
 
 def attribute(result: Described, name: str, default: str = "[]") -> Any:
@@ -161,13 +159,9 @@ def attribute(result: Described, name: str, default: str = "[]") -> Any:
 
 def findings_of(result: Described) -> list[Finding]:
     """The findings that a result carries."""
-    return [
-        Finding(
-            row["what"], row["where"], row["remedy"], Severity(row["severity"]),
-            code=row.get("code", ""), figures=row.get("figures", {}),
-        )
-        for row in attribute(result, "findings")
-    ]  # fmt: skip
+    return [Finding(row["what"], row["where"], row["remedy"], Severity(row["severity"]),
+                    code=row.get("code", ""), figures=row.get("figures", {}))
+            for row in attribute(result, "findings")]  # fmt: skip
 
 
 def summary_of(result: Described) -> list[Figure]:
@@ -217,12 +211,12 @@ class Scales(NamedTuple):
 
     def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:
         """Figures, 0 where they are rounding, but for those that tell of the solution."""
-        return [
-            replace(figure, value=0.0)
-            if isinstance(figure.value, float) and not figure.numerical and abs(figure.value) <= self.floor(figure.unit)
-            else figure
-            for figure in figures
-        ]
+
+        def noise(figure: Figure) -> bool:
+            value = figure.value
+            return isinstance(value, float) and not figure.numerical and abs(value) <= self.floor(figure.unit)
+
+        return [replace(figure, value=0.0) if noise(figure) else figure for figure in figures]
 
 
 def powers_of(unit: str) -> tuple[float, float, float]:

@@ -46,9 +46,7 @@ def of_members(result: xr.Dataset, dim: str, stems: Stems, has: Has = lambda *_:
     """The columns of the members of a dimension, one member after another, of variables that the result has."""
     arrays = {variable: result[variable] for variable in stems if variable in result}  # to look each up takes long
     values = {variable: array.values for variable, array in arrays.items()}
-    between = {
-        variable: array.dims[1:-1] for variable, array in arrays.items()
-    }  # the members and the positions or times
+    between = {name: array.dims[1:-1] for name, array in arrays.items()}  # the members and the positions or times
     labels = {other: result[other].values.astype(str).tolist() for others in between.values() for other in others}
     for i, member in enumerate(result[dim].values if dim in result.dims else ()):
         for variable, array in arrays.items():

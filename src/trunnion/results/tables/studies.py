@@ -152,7 +152,7 @@ def _verdicts(result: xr.Dataset) -> list[Column]:
         unit_named = str(variable.attrs["units"])
         if variable.dims == ("channel", "condition"):
             unit, values = (
-                str(result.attrs["drive_unit"]) if unit_named == "drive" else unit_named,
+                result.attrs["drive_unit"] if unit_named == "drive" else unit_named,
                 variable.values.T.ravel(),
             )
             columns.append(Column(str(name), unit, _words(result, "verdict", values) if name == "verdict" else values))
@@ -188,8 +188,7 @@ def _pairs(result: xr.Dataset, along_positions: bool) -> list[Column]:
         pairs = np.array(rows, np.intp).reshape(-1, 3)
     index = tuple(pairs.T)
     columns = [
-        Column("channel", "", _texts(result["channel"].values)[index[0]]),
-        Column("condition", "", _texts(result["condition"].values)[index[1]]),
+        *(Column(dim, "", _texts(result[dim].values)[index[k]]) for k, dim in enumerate(("channel", "condition"))),
         Column("unit", "", _texts(attribute(result, "channel_units"))[index[0]]),
     ]
     if along_positions:

@@ -117,15 +117,6 @@ def test_one_finding_for_each_problem(text: str, expected: list[str], tmp_path: 
         assert line.startswith(start), line
 
 
-def test_a_large_file_is_refused_quickly_with_the_limit(tmp_path: Path) -> None:
-    started = time.process_time()
-    for count, what in ((10**6, "has 13.8 MB, a table at most 1.0 MB"), (MAX_ROWS + 2, f"from 2 to {MAX_ROWS}")):
-        text = "".join(f"{k},{k}\n" for k in range(count))
-        (finding,) = refused(lambda text=text: MODEL.with_table("O", csv(tmp_path, text)), tmp_path)  # type: ignore[misc]
-        assert what in finding
-    assert time.process_time() - started < 3
-
-
 def test_what_is_no_text_or_not_there(tmp_path: Path) -> None:
     (tmp_path / "latin.csv").write_bytes(b"t,\xb0\n0,1\n")
     for name, file, what in (
@@ -242,10 +233,12 @@ def test_what_is_no_plain_file_in_the_folder(name: str, said: str, tmp_path: Pat
 
 
 def test_sizes_are_bounded(tmp_path: Path) -> None:
+    started = time.process_time()
     path = written(tmp_path, points="0;1\n" * (MAX_ROWS + 2))
     assert "to 10000" in refused_model(path)[0]
     written(tmp_path, points="# long\n" * (MAX_BYTES // 7 + 1))
     assert "1 MB" in refused_model(path)[0]
+    assert time.process_time() - started < 3
     long = "".join(f"{k}e-4;1\n" for k in range(9000))
     many = "".join(f", p{k}: {{file: gas.csv}}" for k in range(MAX_OWN_ROWS // 9000 + 1))
     path.write_text(path.read_text("utf-8").replace("tables:\n", "tables: {").replace(

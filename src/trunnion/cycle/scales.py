@@ -77,7 +77,7 @@ def _stated(run: Run, length: float, rate: float) -> tuple[list[float], list[flo
         section, unit = entry.location[0], entry.kind.unit
         if unit in sizes and not (section == "loads" and entry.location[1] in resting):
             sizes[unit].append(peak(primal(values[path])))
-        lengths, rates, forces = powers_of(unit) if section in ("links", "springs") else (0, 0, 0)
+        lengths, rates, forces = powers_of(unit)[0] if section in ("links", "springs") else (0, 0, 0)
         if forces == 1.0 and (lengths or rates):
             with np.errstate(all="ignore"):  # a scale beyond the floats makes no force
                 scale = np.float64(length) ** -lengths * np.float64(rate) ** -rates

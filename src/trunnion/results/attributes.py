@@ -195,7 +195,7 @@ class Scales(NamedTuple):
 
         0 where no scale is known; NaN, which nothing is below, of what is no unit of mechanics.
         """
-        powers, factor = _powers(unit)
+        powers, factor = powers_of(unit)
         with np.errstate(all="ignore"):  # of nothing at rest, and of rates of 1e160 1/s
             size = float(np.prod(np.power(self, powers)))
         return ROUNDING * size / factor if math.isfinite(size) else 0.0
@@ -219,13 +219,8 @@ class Scales(NamedTuple):
         return [replace(figure, value=0.0) if noise(figure) else figure for figure in figures]
 
 
-def powers_of(unit: str) -> tuple[float, float, float]:
-    """The powers of length, rate and force in a unit; 0 of what is no unit of mechanics."""
-    return _powers(unit)[0]
-
-
 @cache
-def _powers(unit: str) -> tuple[tuple[float, float, float], float]:
+def powers_of(unit: str) -> tuple[tuple[float, float, float], float]:
     """The powers of length, rate and force in a unit, and its factor to SI; NaN of what is no unit of mechanics."""
     if unit in ("", "1"):  # without the package that reads units
         return (0.0, 0.0, 0.0), 1.0

@@ -201,12 +201,10 @@ def check_values(
     no other number are found, and of warnings some.
     """
     values = numbers.nominal
-    every = {(section, name) for section in ("links", "drivers", "tables", "measures")
-             for name in getattr(mechanism, section)}  # fmt: skip
-    every |= {("joints", name) for name in mechanism.effective_joints}
-    touched = every if changed is None else {tuple(path.split(".", 2)[:2]) for path in changed}
+    paths = numbers.entries if changed is None else changed
+    touched = {tuple(path.split(".", 2)[:2]) for path in paths}
     sections = {section for section, *_ in touched}
-    for path in numbers.entries if changed is None else changed:
+    for path in paths:
         yield from _alone(numbers, path)
     for section in ("links", "drivers", "tables", "measures", "joints"):
         entries = mechanism.effective_joints if section == "joints" else getattr(mechanism, section)

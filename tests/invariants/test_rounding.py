@@ -14,8 +14,7 @@ from mechanisms import DURANGO, in_units, model, slider_crank, transformed
 from mechanisms_parts import bare, joined
 from mechanisms_space import rssr
 from trunnion import Mechanism
-from trunnion.results.attributes import Scales
-from trunnion.results.dataset import without_noise
+from trunnion.results.dataset import Scales, without_noise
 
 Data = dict[str, Any]
 SIZES = [(1.0, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]

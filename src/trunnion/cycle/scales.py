@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle.fill import allocate, fill_chunk
 from trunnion.errors import Status
-from trunnion.results.attributes import Scales, powers_of
+from trunnion.results.dataset import Scales, powers_of
 from trunnion.solve.run import Run
 
 __all__ = ["largest", "peak", "scales_of"]

@@ -34,8 +34,8 @@ from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contact, ContactState, Push, pushes_of
 from trunnion.errors import Finding, Status
 from trunnion.results import variables as results
-from trunnion.results.attributes import Figure, Scales, cited, encoded, finding_rows, origin
-from trunnion.results.dataset import Result, Variable, dataset_of, described
+from trunnion.results.attributes import Figure, cited, encoded, finding_rows, origin
+from trunnion.results.dataset import Result, Scales, Variable, dataset_of, described
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_middle
 from trunnion.solve.forward import Forward, SpatialWalk

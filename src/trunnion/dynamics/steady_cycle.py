@@ -36,8 +36,8 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, scales_in, summary_of
-from trunnion.results.dataset import Result
+from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, summary_of
+from trunnion.results.dataset import Result, scales_in
 from trunnion.results.quantities import readable
 from trunnion.solve.run import prepare
 

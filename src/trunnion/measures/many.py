@@ -26,7 +26,7 @@ from trunnion.measures.evaluation import Kernel, SeatedKernel, lanes_of, picked,
 from trunnion.measures.figures import Panels, Read, Reading, combined, turn
 from trunnion.measures.measures import Measure, angles, near, within
 from trunnion.measures.positions import ends_by_name, moved
-from trunnion.results.attributes import ROUNDING, Scales
+from trunnion.results.dataset import ROUNDING, Scales
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of

@@ -1,27 +1,19 @@
 """What a result says beside its numbers: where it comes from, its summary and findings; written and read here alone.
 
-A number that a result is told by is a `Figure`: what it is called, of what it is, its unit and its place. One floor
-for every figure, whatever its unit and however small or large the mechanism, says what is rounding (`Scales`): a torque
-counts beside the largest force times the largest length, a power beside that times the largest rate.
+A number that a result is told by is a `Figure`: what it is called, of what it is, its unit and its place.
 """
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
 from math import isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Protocol
 
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.model.units import UnitError, shown_as, stated_units
-from trunnion.model.units import unit as unit_named
+from trunnion.model.units import shown_as, stated_units
 from trunnion.results.quantities import Units, common
 from trunnion.version import __version__
 
@@ -31,9 +23,8 @@ if TYPE_CHECKING:
     pass
 
 __all__ = [
-    "EVERYWHERE", "KEPT", "MORE_THAN", "NUMERICAL", "Figure", "Scales", "attribute", "cited", "codes", "encoded",
-    "extreme_place", "finding_rows", "findings_of", "origin", "plain", "powers_of", "scales_in", "summary_of",
-    "units_of", "whole",
+    "KEPT", "MORE_THAN", "NUMERICAL", "Figure", "attribute", "cited", "codes", "encoded", "finding_rows",
+    "findings_of", "origin", "plain", "summary_of", "units_of", "whole",
 ]  # fmt: skip
 
 _AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
@@ -174,73 +165,3 @@ def units_of(result: Described) -> Units:
     rows = [row for row in summary_of(result) if not row.numerical]
     with shown_as(attribute(result, "model_units", "{}")):
         return common((row.value, row.unit) for row in rows if isinstance(row.value, float))
-
-
-# ---- how large lengths, rates and forces are: what is no more than their rounding is 0 --------------------------
-
-Array = NDArray[np.float64]
-ROUNDING = 1e-10  # of the largest of its kind: what is less is no more than rounding, and how well a break is located
-EVERYWHERE = "everywhere"  # the place of an extreme of what is constant
-
-
-class Scales(NamedTuple):
-    """The largest length, m, rate, 1/s, and force, N, of a mechanism in its cycle."""
-
-    length: float
-    rate: float
-    force: float
-
-    def floor(self, unit: str) -> float:
-        """What is rounding of a quantity in a unit such as `N m`, `mm` or `°`, in that unit.
-
-        0 where no scale is known; NaN, which nothing is below, of what is no unit of mechanics.
-        """
-        powers, factor = powers_of(unit)
-        with np.errstate(all="ignore"):  # of nothing at rest, and of rates of 1e160 1/s
-            size = float(np.prod(np.power(self, powers)))
-        return ROUNDING * size / factor if math.isfinite(size) else 0.0
-
-    def zeroed(self, values: Array, unit: str) -> Array:
-        """The values in a unit, 0 where they are rounding."""
-        return np.where(np.abs(values) <= self.floor(unit), 0.0, values)
-
-    def summary(self, figures: Iterable[Figure]) -> dict[str, Any]:
-        """The attributes of a result with its figures: the summary, and these scales."""
-        rows = [figure.row() for figure in self.of_figures(figures)]
-        return {"summary": rows, **{f"scale_of_{name}": size for name, size in self._asdict().items()}}
-
-    def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:
-        """Figures, 0 where they are rounding, but for those that tell of the solution."""
-
-        def noise(figure: Figure) -> bool:
-            value = figure.value
-            return isinstance(value, float) and not figure.numerical and abs(value) <= self.floor(figure.unit)
-
-        return [replace(figure, value=0.0) if noise(figure) else figure for figure in figures]
-
-
-@cache
-def powers_of(unit: str) -> tuple[tuple[float, float, float], float]:
-    """The powers of length, rate and force in a unit, and its factor to SI; NaN of what is no unit of mechanics."""
-    if unit in ("", "1"):  # without the package that reads units
-        return (0.0, 0.0, 0.0), 1.0
-    try:
-        factor, (length, mass, time, _) = unit_named("deg" if unit == "°" else unit)
-    except UnitError:
-        return (0.0, 0.0, 0.0), math.nan
-    # a mass is a force over an acceleration, length times rate²
-    return (float(length - mass), float(-time - 2 * mass), float(mass)), float(factor)
-
-
-def extreme_place(course: Array, place: str, floor: float = ROUNDING) -> str:
-    """Where a course (position,), NaN where it has no value, has an extreme: everywhere if it is constant to rounding.
-
-    place: of the extreme, as "at 24°"; floor: what is rounding of it, see `Scales.floor`, or of numbers without a unit.
-    """
-    values = course[~np.isnan(course)]
-    return EVERYWHERE if len(values) > 1 and np.max(values) - np.min(values) <= floor else place
-
-
-def scales_in(result: Described) -> Scales:
-    """The scales that a result carries; NaN, beside which nothing is rounding, if it carries none."""
-    return Scales(*(float(result.attrs.get(f"scale_of_{name}", "nan")) for name in Scales._fields))

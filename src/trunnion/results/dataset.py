@@ -1,23 +1,31 @@
-"""What describes a variable of a result, and the one place where arrays become an xarray Dataset."""
+"""What describes a variable of a result, and the one place where arrays become an xarray Dataset.
+
+One floor for every figure, whatever its unit and however small or large the mechanism, says what is rounding: a torque
+counts beside the largest force times the largest length, a power beside that times the largest rate (`Scales`).
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trunnion.results.attributes import encoded, scales_in
+from trunnion.model.units import UnitError
+from trunnion.model.units import unit as unit_named
+from trunnion.results.attributes import Described, Figure, encoded
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "UNITS_OF_EACH", "Column", "MemberUnits", "Result", "Variable", "dataset_of", "described", "driven", "flat",
-    "unit_of", "units_along", "with_variables", "without_noise",
+    "EVERYWHERE", "ROUNDING", "UNITS_OF_EACH", "Column", "MemberUnits", "Result", "Scales", "Variable",
+    "dataset_of", "described", "driven", "extreme_place", "flat", "powers_of", "scales_in", "unit_of",
+    "units_along", "with_variables", "without_noise",
 ]  # fmt: skip
 
 
@@ -191,6 +199,76 @@ def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> 
 def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> list[str]:
     units = (variable.attrs.get(UNITS_OF_EACH) for variable in variables.values())
     return list(dict.fromkeys(name for name in units if name is not None))
+
+
+# ---- how large lengths, rates and forces are: what is no more than their rounding is 0 --------------------------
+
+Array = NDArray[np.float64]
+ROUNDING = 1e-10  # of the largest of its kind: what is less is no more than rounding, and how well a break is located
+EVERYWHERE = "everywhere"  # the place of an extreme of what is constant
+
+
+class Scales(NamedTuple):
+    """The largest length, m, rate, 1/s, and force, N, of a mechanism in its cycle."""
+
+    length: float
+    rate: float
+    force: float
+
+    def floor(self, unit: str) -> float:
+        """What is rounding of a quantity in a unit such as `N m`, `mm` or `°`, in that unit.
+
+        0 where no scale is known; NaN, which nothing is below, of what is no unit of mechanics.
+        """
+        powers, factor = powers_of(unit)
+        with np.errstate(all="ignore"):  # of nothing at rest, and of rates of 1e160 1/s
+            size = float(np.prod(np.power(self, powers)))
+        return ROUNDING * size / factor if math.isfinite(size) else 0.0
+
+    def zeroed(self, values: Array, unit: str) -> Array:
+        """The values in a unit, 0 where they are rounding."""
+        return np.where(np.abs(values) <= self.floor(unit), 0.0, values)
+
+    def summary(self, figures: Iterable[Figure]) -> dict[str, Any]:
+        """The attributes of a result with its figures: the summary, and these scales."""
+        rows = [figure.row() for figure in self.of_figures(figures)]
+        return {"summary": rows, **{f"scale_of_{name}": size for name, size in self._asdict().items()}}
+
+    def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:
+        """Figures, 0 where they are rounding, but for those that tell of the solution."""
+
+        def noise(figure: Figure) -> bool:
+            value = figure.value
+            return isinstance(value, float) and not figure.numerical and abs(value) <= self.floor(figure.unit)
+
+        return [replace(figure, value=0.0) if noise(figure) else figure for figure in figures]
+
+
+@functools.cache
+def powers_of(unit: str) -> tuple[tuple[float, float, float], float]:
+    """The powers of length, rate and force in a unit, and its factor to SI; NaN of what is no unit of mechanics."""
+    if unit in ("", "1"):  # without the package that reads units
+        return (0.0, 0.0, 0.0), 1.0
+    try:
+        factor, (length, mass, time, _) = unit_named("deg" if unit == "°" else unit)
+    except UnitError:
+        return (0.0, 0.0, 0.0), math.nan
+    # a mass is a force over an acceleration, length times rate²
+    return (float(length - mass), float(-time - 2 * mass), float(mass)), float(factor)
+
+
+def extreme_place(course: Array, place: str, floor: float = ROUNDING) -> str:
+    """Where a course (position,), NaN where it has no value, has an extreme: everywhere if it is constant to rounding.
+
+    place: of the extreme, as "at 24°"; floor: what is rounding of it, see `Scales.floor`, or of numbers without a unit.
+    """
+    values = course[~np.isnan(course)]
+    return EVERYWHERE if len(values) > 1 and np.max(values) - np.min(values) <= floor else place
+
+
+def scales_in(result: Described) -> Scales:
+    """The scales that a result carries; NaN, beside which nothing is rounding, if it carries none."""
+    return Scales(*(float(result.attrs.get(f"scale_of_{name}", "nan")) for name in Scales._fields))
 
 
 # variables that tell how well a result is solved: their rounding is what they are there for

@@ -21,8 +21,8 @@ from trunnion.errors import Coded, Finding, MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import EVERYWHERE, Figure, Scales, cited, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.results.attributes import Figure, cited, finding_rows, origin
+from trunnion.results.dataset import EVERYWHERE, Scales, Variable, dataset_of, described, driven
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward

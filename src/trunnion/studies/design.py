@@ -25,7 +25,8 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import pressure_angles
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import EVERYWHERE, Figure
+from trunnion.results.attributes import Figure
+from trunnion.results.dataset import EVERYWHERE
 from trunnion.solve.backward import pose_status
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity
 from trunnion.model.tolerances import Price
-from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, scales_in, summary_of
-from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
+from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, summary_of
+from trunnion.results.dataset import MemberUnits, Variable, described, scales_in, units_along, with_variables
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import Answer, Criterion

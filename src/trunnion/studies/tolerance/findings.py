@@ -22,7 +22,8 @@ from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.checks.check import check_values
-from trunnion.results.attributes import Figure, extreme_place
+from trunnion.results.attributes import Figure
+from trunnion.results.dataset import extreme_place
 from trunnion.results.quantities import decimals_of, readable, scale_of, signed
 from trunnion.studies.tolerance.effects import Corner
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, limited

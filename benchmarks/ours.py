@@ -61,9 +61,7 @@ def compiled_side(job: Job, threads: int = 1) -> Side | None:
             return lambda back: list(_rows_of_motion(back.walk))[k]
         return lambda back: list(_rows_of_forces(back))[k]
 
-    kernel = WalkKernel(
-        prepared, {name: figure(k) for k, name in enumerate(columns)}, job != "motion", threads=threads, described=job
-    )
+    kernel = WalkKernel(prepared, {name: figure(k) for k, name in enumerate(columns)}, job != "motion", threads=threads)
 
     def run(n: int) -> Array:
         out = np.empty((len(columns), 1, n))

@@ -439,13 +439,6 @@ _ENGINES = (
         ("tests/reference/test_compiled.py",),
     ),
     Fault(
-        "kept-code-of-other-figures",
-        "solve/walk_kernel.py",
-        "request = described, list(figures), forces,",
-        "request = described, forces,",
-        ("tests/reference/test_compiled.py",),
-    ),
-    Fault(
         "component-against-the-edges",
         "structure/graph.py",
         "before[other].append(node)",

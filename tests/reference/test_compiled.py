@@ -85,32 +85,14 @@ def test_errors_stand_beside_the_ideal_mechanism() -> None:
     agree(one, other)
 
 
-def kernel_of(figure: str, described: str | None = "efforts") -> WalkKernel:
-    run = prepare(trunnion.read(DURANGO))
-    return WalkKernel(run, {figure: lambda back: back.efforts["A"]}, described=described)
+def kernel_of(figure: str) -> WalkKernel:
+    return WalkKernel(prepare(trunnion.read(DURANGO)), {figure: lambda back: back.efforts["A"]})
 
 
 def curve(kernel: WalkKernel) -> Any:
     run = kernel.run
     (found,) = kernel.curves(run.values, run.cycle.times(24))[0].values()
     return found[0]
-
-
-def test_kept_code_is_found_without_recording(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    first = curve(kernel_of("one"))
-    recorded: list[int] = []
-    plain = WalkKernel._recorded
-    monkeypatch.setattr(WalkKernel, "_recorded", lambda self, inputs: recorded.append(1) or plain(self, inputs))
-    assert np.array_equal(curve(kernel_of("one")), first)
-    assert not recorded
-    curve(kernel_of("other"))  # other figures
-    curve(kernel_of("one", described=None))  # figures that nothing tells from others of this name
-    assert len(recorded) == 2
-    for path in (tmp_path / "trunnion" / "compiled").glob("*.key"):
-        path.write_bytes(b"damaged")
-    assert np.array_equal(curve(kernel_of("one")), first)
-    assert len(recorded) == 3
 
 
 def test_without_a_home_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -59,7 +59,6 @@ class CycleKernel:
             method=method,
             gravest=Status.SOLVED,
             undefined=[name for name, (variable, _) in self._names.items() if variable in UNDEFINED],
-            described="cycle",
         )
         self._kernel.check(values, time)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import json
 import os
 import platform
 import stat
@@ -55,7 +54,10 @@ class MachineCode:
 
     def __init__(self, program: Program, folder: Path | None = None) -> None:
         with COMPILING:
-            self.path = _path(program, _folder(folder))
+            # its file, by what it does, for which processor, made by which versions
+            text = "\0".join((program.text, *_target(), llvmlite.__version__, __version__))
+            folder = cache_directory("compiled") if folder is None else folder
+            self.path = folder / f"{hashlib.sha256(text.encode()).hexdigest()}.o"
             code = _read(self.path)
             self.compiled = code is None
             if code is None:
@@ -63,31 +65,7 @@ class MachineCode:
                 module.verify()
                 code = bytes(_machine().emit_object(module))
                 _keep(self.path, code)
-        self._link(program.inputs, program.rows, program.width, code)
-
-    @classmethod
-    def known(cls, key: str, folder: Path | None = None) -> MachineCode | None:
-        """The machine code that was kept under a key, see `keep_as`; None if there is none."""
-        record = _read(_alias(key, _folder(folder)))
-        if record is None:
-            return None
-        name, inputs, rows, width = json.loads(record)
-        path = _folder(folder) / name
-        code = _read(path)
-        if code is None:
-            return None
-        machine_code = cls.__new__(cls)
-        machine_code.path, machine_code.compiled = path, False
-        machine_code._link(tuple(tuple(names) for names in inputs), rows, width, code)
-        return machine_code
-
-    def keep_as(self, key: str) -> None:
-        """Keep it under a key that is known before the program is."""
-        record = json.dumps([self.path.name, self.inputs, self.rows, self.width])
-        _keep(_alias(key, self.path.parent), record.encode())
-
-    def _link(self, inputs: tuple[tuple[str, ...], ...], rows: int, width: int, code: bytes) -> None:
-        self.inputs, self.rows, self.width = inputs, rows, width
+        self.inputs, self.rows, self.width = program.inputs, program.rows, program.width
         with COMPILING:
             self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
             self._engine.add_object_file(llvm.object_file.ObjectFileRef.from_data(code))
@@ -136,34 +114,6 @@ def _machine() -> Any:
 
 
 # ---- on disk --------------------------------------------------------------------------------------------------
-
-
-def _folder(folder: Path | None) -> Path:
-    return cache_directory("compiled") if folder is None else folder
-
-
-def _alias(key: str, folder: Path) -> Path:
-    """The file that tells which program a key stands for, on this processor, by these versions of the sources."""
-    text = "\0".join((key, *_target(), llvmlite.__version__, __version__, _sources()))
-    return folder / f"{hashlib.sha256(text.encode()).hexdigest()}.key"
-
-
-@cache
-def _sources() -> str:
-    """What tells these sources from others of the same version: places, sizes and times of their files."""
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for path in sorted(os.path.join(folder, name) for folder, _, names in os.walk(root) for name in names):
-        if path.endswith(".py"):
-            state = os.stat(path)
-            digest.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
-    return digest.hexdigest()
-
-
-def _path(program: Program, folder: Path) -> Path:
-    """The file of a program, by what it does, for which processor, made by which versions."""
-    text = "\0".join((program.text, *_target(), llvmlite.__version__, __version__))
-    return folder / f"{hashlib.sha256(text.encode()).hexdigest()}.o"
 
 
 def _read(path: Path) -> bytes | None:

@@ -64,9 +64,8 @@ class WalkKernel:
 
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
     than the motion; threads: at a time, by default one for each core; gravest: status from which on NumPy computes a
-    lane again; undefined: figures that may have no finite value; described: tells these figures from all others of the
-    model, so that machine code that was kept is found without recording anything. Raises MechanismError if the
-    mechanism has what only NumPy does.
+    lane again; undefined: figures that may have no finite value. Raises MechanismError if the mechanism has what only
+    NumPy does.
     """
 
     def __init__(
@@ -78,7 +77,6 @@ class WalkKernel:
         threads: int | None = None,
         gravest: Status = Status.ZERO_SLIP,
         undefined: Collection[str] = (),
-        described: str | None = None,
     ) -> None:
         self.run, self.figures, self.forces = run, dict(figures), forces
         self.method, self.gravest, self.undefined = method or FrictionMethod(), gravest, undefined
@@ -86,11 +84,6 @@ class WalkKernel:
         self.again = 0
         if reason := _by_numpy_alone(run, self.method):
             raise _refusal(reason)
-        request = described, list(figures), forces, self.method, gravest, sorted(undefined)
-        laws = (law_of(run.system, joint).function.__module__ for joint in rubbing(run.system))
-        keyed = described is not None and all(name.startswith("trunnion.") for name in laws)
-        model = (run.system.mechanism.model_dump_json(), repr(run.chosen.assembly), repr(request)) if keyed else ()
-        self._key = "\0".join(model)
         self._programs: dict[tuple[Any, ...], MachineCode] = {}
         self._graphs: dict[tuple[Any, ...], tuple[Graph, list[int]]] = {}
         self._recording = Lock()
@@ -163,12 +156,9 @@ class WalkKernel:
     # ---- machine code -----------------------------------------------------------------------------------------------
 
     def check(self, values: Values, time: Array | None = None) -> None:
-        """Record the walk, if its code is not kept; MechanismError where it cannot be recorded.
-
-        time: one that it will be asked for, s, by whose shape code that is kept is found.
-        """
+        """Record the walk for a time, s, of the shape that will be asked for; MechanismError where that cannot be."""
         inputs = _inputs_of(values, np.zeros(1) if time is None else time)
-        if self._kept(inputs) is None:
+        if inputs.structure not in self._programs:
             self._graphs[inputs.structure] = self._recorded(inputs)
 
     def _code(self, inputs: _Inputs) -> MachineCode:
@@ -177,24 +167,11 @@ class WalkKernel:
         from trunnion.engines.program import program
 
         with self._recording:
-            code = self._kept(inputs)
-            if code is None:
+            if inputs.structure not in self._programs:
                 recorded = inputs.structure in self._graphs
                 graph, outputs = self._graphs.pop(inputs.structure) if recorded else self._recorded(inputs)
-                code = self._programs[inputs.structure] = MachineCode(program(graph, outputs, vector_width()))
-                if self._key:
-                    code.keep_as(f"{self._key}\0{inputs.structure!r}")
-            return code
-
-    def _kept(self, inputs: _Inputs) -> MachineCode | None:
-        """The machine code if it needs no recording."""
-        from trunnion.engines.machine_code import MachineCode
-
-        if inputs.structure not in self._programs and self._key:
-            code = MachineCode.known(f"{self._key}\0{inputs.structure!r}")
-            if code is not None:
-                self._programs[inputs.structure] = code
-        return self._programs.get(inputs.structure)
+                self._programs[inputs.structure] = MachineCode(program(graph, outputs, vector_width()))
+            return self._programs[inputs.structure]
 
     @np.errstate(all="ignore")
     def _recorded(self, inputs: _Inputs) -> tuple[Graph, list[int]]:

@@ -146,8 +146,7 @@ class CompiledCourses:
             return lambda back: measure.numbers(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
-        description = repr(list(self._parts.items()))
-        return WalkKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=description)
+        return WalkKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
 
     def check(self, values: Mapping[str, Number]) -> None:
         """MechanismError for a mechanism that only NumPy takes."""

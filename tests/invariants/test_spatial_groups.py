@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brief import brief
 from trunnion import Mechanism
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import flat
 from trunnion.algebra.space import Frame, Screw, compose, element, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup

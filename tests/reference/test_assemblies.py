@@ -21,7 +21,7 @@ from mechanisms import MODELS, analyse, build, class_three, findings, four_bar
 from mechanisms_parts import Data, corner, joined
 from timed import PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, MechanismError
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import flat
 from trunnion.errors import Severity
 from trunnion.solve.assembly_modes import GroupModes, choices, put_together
 from trunnion.solve.hints import hints

@@ -1,4 +1,4 @@
-"""One kernel, any number: pick the functions that fit the numbers a kernel was given.
+"""One kernel, any number: pick the functions that fit the numbers a kernel was given, alone or in nested tuples.
 
 A kernel writes `xp = namespace(x, y)` and then `xp.sqrt(x)`; with floats and NumPy arrays that is NumPy, with
 dual numbers `trunnion.algebra.dual`, with numbers that are recorded those of their engine. Nothing else in a kernel
@@ -7,15 +7,19 @@ depends on the kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
 
-__all__ = ["Number", "Traced", "UntraceableError", "apart", "cut", "looped", "namespace", "recurring"]
+__all__ = [
+    "Number", "Traced", "UntraceableError", "apart", "cut", "each", "flat", "looped", "namespace", "recurring",
+    "replaced", "zipped",
+]  # fmt: skip
 
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
@@ -98,3 +102,35 @@ def looped(step: Step, start: Sequence[Number], rounds: int, done: Done | None =
             break
         state = step(state)
     return state
+
+
+# ---- numbers in nested tuples, as frames and elements are --------------------------------------------------------
+
+
+def each(value: Any, change: Callable[[Number], Number]) -> Any:
+    """The same tuple of tuples with `change` applied to every number."""
+    return zipped(change, value)
+
+
+def zipped(change: Callable[..., Number], first: Any, *others: Any) -> Any:
+    """A tuple of tuples like the first, each number from those at its place in all."""
+    if not isinstance(first, tuple):
+        return change(first, *others)
+    parts = [zipped(change, *group) for group in zip(first, *others, strict=True)]
+    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+
+
+def flat(value: Any) -> Iterator[Number]:
+    """Every number of a tuple of tuples."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from flat(part)
+    else:
+        yield value
+
+
+def replaced(number: Number, lanes: NDArray[np.bool_], new: Number) -> NDArray[np.float64]:
+    """The number in the shape of `lanes`, with others in the lanes that are chosen."""
+    full = np.array(np.broadcast_to(number, lanes.shape), float)
+    full[lanes] = new
+    return full

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from trunnion.algebra import plane
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import moment_at, quaternion
-from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.errors import Status
 from trunnion.groups.dyad import DyadPose
@@ -28,6 +27,7 @@ from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.seating import loads_of
 from trunnion.solve.shifts import GivenSeat, seats
+from trunnion.solve.switches import unwrap_row
 from trunnion.solve.system import Positions, System, Values, sticking
 
 __all__ = [

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.figures import SIGNS
@@ -28,6 +27,7 @@ from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import seating_of
+from trunnion.solve.switches import unwrap_row
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.algebra.dual import primal, single
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import Number, flat
 from trunnion.solve.change_points import folds
 from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.run import Run

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal, single
-from trunnion.algebra.nested import each, flat
+from trunnion.algebra.namespace import each, flat
 from trunnion.algebra.space import moment_at
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import plane
 from trunnion.algebra.dual import Dual, derivative, primal, single
-from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import each
+from trunnion.algebra.namespace import Number, each, namespace
 from trunnion.algebra.space import ORIGIN, Frame, compose, moment_at, slid
 from trunnion.algebra.vector import Vector3, cross, dot, length, minus, plus, scaled
 from trunnion.joints.contact import elastic_force, hertz_stiffness, normal_force

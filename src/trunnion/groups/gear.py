@@ -72,14 +72,9 @@ def slide_of(pair: Sequence[Frame]) -> Number:
     return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
 
-def _direction(first: Frame, second: Frame) -> Vector2:
-    """Cosine and sine of the rotation of the second element against the first."""
-    return first.c * second.c + first.s * second.s, first.c * second.s - first.s * second.c
-
-
 def turn_from(first: Frame, second: Frame, less: Number) -> Number:
     """Rotation of the second element against the first less an angle, within half a turn."""
-    c, s = _direction(first, second)
+    c, s = first.c * second.c + first.s * second.s, first.c * second.s - first.s * second.c
     if not is_zero(less):
         xp = namespace(less)
         cos, sin = xp.cos(less), xp.sin(less)

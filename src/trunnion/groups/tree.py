@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
-from trunnion.algebra.namespace import Number, apart, looped, namespace
-from trunnion.algebra.nested import each, flat, replaced
+from trunnion.algebra.namespace import Number, apart, each, flat, looped, namespace, replaced
 from trunnion.groups import redundant
 from trunnion.groups.gear import NUMBERS
 from trunnion.groups.redundant import Support

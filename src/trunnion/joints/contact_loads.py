@@ -24,8 +24,7 @@ import numpy as np
 from trunnion.algebra import plane
 from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero
-from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import each
+from trunnion.algebra.namespace import Number, each, namespace
 from trunnion.algebra.space import Frame
 from trunnion.algebra.vector import Vector3, cross, dot, minus
 

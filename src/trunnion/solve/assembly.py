@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import each, zipped
+from trunnion.algebra.namespace import each, zipped
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.spatial import SpatialGroup

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, cut, namespace
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import Number, cut, flat, namespace
 from trunnion.algebra.plane import ZERO_LOAD, Wrench, added
 from trunnion.errors import Status
 from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh, thread_forces

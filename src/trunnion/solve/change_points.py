@@ -21,14 +21,7 @@ from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.solve.forward import Forward, pose_of, posed
 from trunnion.solve.system import Cycle, System, driven_coordinates
-from trunnion.solve.track import (
-    SAME,
-    TOUCHING,
-    Follower,
-    Track,
-    TrackClock,
-    carried_on,
-)
+from trunnion.solve.track import SAME, TOUCHING, Follower, Track, TrackClock, carried_on
 from trunnion.structure.decompose import Module
 
 __all__ = ["Meeting", "Meetings", "folds", "followed_through", "suspects", "through", "touched"]

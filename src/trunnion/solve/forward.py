@@ -17,8 +17,7 @@ import numpy as np
 from trunnion.algebra import plane, space
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.literal import is_zero
-from trunnion.algebra.namespace import Number, cut, namespace
-from trunnion.algebra.nested import each, flat, zipped
+from trunnion.algebra.namespace import Number, cut, each, flat, namespace, zipped
 from trunnion.algebra.plane import Twist, Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, minus, plus, scaled, transpose

@@ -28,8 +28,7 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.linalg import weighted
 from trunnion.algebra.literal import less, plus, times
-from trunnion.algebra.namespace import Number, apart, looped, recurring
-from trunnion.algebra.nested import replaced
+from trunnion.algebra.namespace import Number, apart, looped, recurring, replaced
 from trunnion.joints.contact_loads import ContactLoad, Reaction
 from trunnion.solve import continuation
 from trunnion.solve.continuation import largest
@@ -154,10 +153,7 @@ class FrictionProblem:
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
     def in_lanes(
-        self,
-        function: Callable[[FrictionProblem, Number], Sequence[Number]],
-        lanes: Number,
-        others: Sequence[Number],
+        self, function: Callable[[FrictionProblem, Number], Sequence[Number]], lanes: Number, others: Sequence[Number]
     ) -> list[Number]:
         """function(problem, lanes that count) in some lanes, computed apart where that can be; `others` elsewhere."""
         if not np.any(lanes):

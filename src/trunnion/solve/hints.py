@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal, single
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import each, flat
+from trunnion.algebra.namespace import Number, each, flat
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.tree import Element
 from trunnion.joints.pairs import PAIRS

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import Number, flat, namespace
 from trunnion.algebra.spline import look_up
 from trunnion.model.expression import PLACED
 from trunnion.model.mechanism import Mechanism

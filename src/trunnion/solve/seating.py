@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, primal, single
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import each, flat
+from trunnion.algebra.namespace import Number, each, flat
 from trunnion.algebra.panels import FIT, ON_GRID, ORDER, POINTS
 from trunnion.errors import Status
 from trunnion.joints.clearance import pressed, turned_by_friction

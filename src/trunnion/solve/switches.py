@@ -30,7 +30,7 @@ from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
     "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "near", "root",
-    "shifts_of", "stated_bends", "tracked", "turned",
+    "shifts_of", "stated_bends", "tracked", "turned", "unwrap_row",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -406,3 +406,15 @@ def turned(
         (time, angle - angle[start] + np.nan_to_num(begin))
         for (time, angle), start, begin in zip(rows, starts, begins, strict=True)
     ]
+
+
+def unwrap_row(angle: NDArray[np.float64], rate: NDArray[np.float64], step: float) -> None:
+    """Add whole turns in place so that the angle follows its rate from position to position (`step` s apart).
+
+    A gap of NaN is bridged to the nearest turn.
+    """
+    solved = np.flatnonzero(np.isfinite(angle))
+    values, rates = angle[solved], np.nan_to_num(rate[solved])
+    expected = np.where(np.diff(solved) == 1, (rates[1:] + rates[:-1]) / 2 * step, 0.0)
+    turns = np.cumsum(np.rint((expected - np.diff(values)) / (2 * np.pi)))
+    angle[solved[1:]] = values[1:] + 2 * np.pi * turns

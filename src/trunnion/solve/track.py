@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import each
+from trunnion.algebra.namespace import Number, each, namespace
 from trunnion.groups.tree import Tree
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
@@ -223,19 +222,17 @@ class Follower:
             q, share = solved[:, farthest], float(ends[farthest])
         return q
 
-    def _at(self, places: Places, guess: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def _at(self, places: Places, guess: Array, late: int = 0) -> tuple[Array, NDArray[np.bool_]]:
         """Coordinates at some positions, and where they are of the right sense.
 
         Those that a few rounds do not settle are left to narrower strides: past the end of a branch Newton's method
-        wanders as long as it is let.
+        wanders as long as it is let, `late` rounds more.
         """
-        return self._solved(at(self.elements, places), [lane_of(n, places) for n in self.drive], guess, 0)
+        return self._solved(at(self.elements, places), [lane_of(n, places) for n in self.drive], guess, late)
 
     def solved_from(self, place: int, guess: Array) -> Array | None:
         """Coordinates at a position, by Newton from a guess, (kept,); None if they are not of the right sense."""
-        index = np.array([place])
-        drive = [lane_of(n, index) for n in self.drive]
-        solved, good = self._solved(at(self.elements, index), drive, guess[:, None], NEAR_LIMIT)
+        solved, good = self._at(np.array([place]), guess[:, None], NEAR_LIMIT)
         return solved[:, 0] if good[0] else None
 
     def broken(self, rows: Array, times: Array) -> list[float]:
@@ -326,14 +323,7 @@ class Track:
         again = alternating(self.passed, moment) * float(alternating(self.passed, np.float64(self.begin)))
         return self.orientation * again
 
-    def pose(
-        self,
-        group: Any,
-        elements: Sequence[Any],
-        drive: Sequence[Number],
-        walk: Forward,
-        time: Number,
-    ) -> Any:
+    def pose(self, group: Any, elements: Sequence[Any], drive: Sequence[Number], walk: Forward, time: Number) -> Any:
         """Pose, of a general group by Newton from the track; NaN in the lanes that left its branch."""
         moment = primal(self.clock.nominal(walk, time))
         moment = np.mod(moment, self.times[-1]) if self.periodic else moment

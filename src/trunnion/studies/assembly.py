@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import flat
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import inputs, member_units
 from trunnion.errors import Coded, Finding, MechanismError

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import flat
 from trunnion.errors import MechanismError, Status
 from trunnion.solve.backward import Backward, status_of
 from trunnion.solve.forward import Forward

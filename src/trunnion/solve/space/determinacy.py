@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import flat
+from trunnion.algebra.namespace import flat
 from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot
 from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted

@@ -231,14 +231,7 @@ class Ask(NamedTuple):
     widths: tuple[int, ...]
 
 
-class ConeAnswer(NamedTuple):
-    """Of one linearised problem: steps, offsets, t, the dual's lower bound of t, and what each end contributes."""
-
-    steps: Array
-    offsets: Array
-    least: float
-    bound: float
-    weights: Array
+ConeAnswer = tuple[Array, Array, float, float, Array]  # steps, offsets, t, lower bound of t, what each end contributes
 
 
 @dataclass(frozen=True)
@@ -284,12 +277,11 @@ def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> LeastPlay:
             if answer is None:
                 least[lane], done[place] = np.inf, True
                 continue
-            before[lane], least[lane], bound[lane] = least[lane], answer.least, answer.bound
-            weights[lane] = answer.weights
-            largest = float(np.max(np.abs(answer.steps), initial=0.0))
+            before[lane], (step, offsets, least[lane], bound[lane], weights[lane]) = least[lane], answer
+            largest = float(np.max(np.abs(step), initial=0.0))
             length = (0.5 if grew[place] else 1.0) * min(1.0, LARGEST / max(largest, 1e-300))
-            steps[place] = length * answer.steps
-            c[lane] += length * (answer.offsets - c[lane])
+            steps[place] = length * step
+            c[lane] += length * (offsets - c[lane])
         moving = ~done
         q[active[moving]] = part.at(np.flatnonzero(moving)).moved(q[active[moving]], steps[moving])
         active = active[moving]
@@ -306,7 +298,7 @@ def _solve(linear: LinearLoops, c: Array, ask: Ask, size: float) -> ConeAnswer |
     columns, components, ends = jacobian.shape[1], effect.shape[1], len(ask.widths)
     lever = float(np.max(np.abs(effect), initial=0.0))
     if unit <= NOTHING:
-        return ConeAnswer(np.zeros(columns), np.zeros(components), 0.0, 0.0, np.zeros(ends))
+        return np.zeros(columns), np.zeros(components), 0.0, 0.0, np.zeros(ends)
     if not lever:
         return None
     length = unit / lever  # m: an offset of 1
@@ -333,13 +325,8 @@ def _solve(linear: LinearLoops, c: Array, ask: Ask, size: float) -> ConeAnswer |
     if str(solution.status) not in SOUND:
         return None
     x, z = np.asarray(solution.x), np.asarray(solution.z)
-    return ConeAnswer(
-        unit * x[:columns],
-        length * x[columns:-1],
-        length / share * float(x[-1]),
-        length / share * float(solution.obj_val_dual),
-        z[len(gap) + firsts] * ask.share / share,
-    )
+    least, bound = length / share * float(x[-1]), length / share * float(solution.obj_val_dual)
+    return unit * x[:columns], length * x[columns:-1], least, bound, z[len(gap) + firsts] * ask.share / share
 
 
 # ---- where to start -------------------------------------------------------------------------------------------------

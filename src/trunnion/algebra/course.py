@@ -464,13 +464,11 @@ class _Resolving:
         torn &= np.array(near) > 10 * self._accuracy.shortest * self._span[owner]
         chosen = np.flatnonzero(torn)
         chosen = chosen[np.diff(chosen, prepend=-2) > 1]  # of neighbours the next time
-        margin = 0.02 * np.minimum(width[chosen], width[chosen + 1])
+        before, after = 0.02 * width[chosen], 0.014 * width[chosen + 1]  # beyond the place next to the edge
         gone = np.concatenate([chosen, chosen + 1])
         self._done = [panels.picked(np.setdiff1d(np.arange(len(edges) + 1), gone))]
-        parts = np.array(
-            [panels.low[chosen], edges[chosen] - margin, edges[chosen] + 0.7 * margin, panels.high[chosen + 1]]
-        ).T
-        return _between(list(parts), owner[chosen])
+        parts = [panels.low[chosen], edges[chosen] - before, edges[chosen] + after, panels.high[chosen + 1]]
+        return _between([*np.column_stack(parts)], owner[chosen])
 
     def _courses(self, k: int, panels: _Panels) -> Courses:
         """The courses of one mechanism; the panels about located breaks have shrunk to nothing."""

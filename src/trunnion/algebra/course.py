@@ -464,7 +464,9 @@ class _Resolving:
         torn &= np.array(near) > 10 * self._accuracy.shortest * self._span[owner]
         chosen = np.flatnonzero(torn)
         chosen = chosen[np.diff(chosen, prepend=-2) > 1]  # of neighbours the next time
-        before, after = 0.02 * width[chosen], 0.014 * width[chosen + 1]  # beyond the place next to the edge
+        sides = np.array([width[chosen], width[chosen + 1]])
+        jumps = panels.labels[chosen] == panels.labels[chosen + 1]  # between the edge and the place next to it
+        before, after = np.array([[0.02], [0.014]]) * np.where(jumps, sides, np.min(sides, axis=0))
         gone = np.concatenate([chosen, chosen + 1])
         self._done = [panels.picked(np.setdiff1d(np.arange(len(edges) + 1), gone))]
         parts = [panels.low[chosen], edges[chosen] - before, edges[chosen] + after, panels.high[chosen + 1]]

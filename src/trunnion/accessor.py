@@ -20,7 +20,7 @@ from trunnion.results.attributes import Figure as Figure
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.save import frame, save
 from trunnion.results.tables import KINDS, kind_of
-from trunnion.views.shown import figure_of, report_of, result_html
+from trunnion.views.shown import plot, report, result_html
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +75,7 @@ class Accessor:
 
     def report(self, path: str | os.PathLike[str] | None = None, **options: Any) -> str:
         """The report as HTML, also written if a path is given; options: those of the view, as ideal= of a cycle."""
-        text = report_of(self._result, **options)
+        text = report(self._result, **options)
         if path is not None:
             with whole(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
@@ -83,7 +83,7 @@ class Accessor:
 
     def plot(self, kind: str | None = None, **options: Any) -> Drawing:
         """A matplotlib figure: the main one of its view, or of a kind such as "reactions"."""
-        return figure_of(self._result, kind, **options)
+        return plot(self._result, kind, **options)
 
     def animate(self, ideal: xr.Dataset | None = None, height: int = 760) -> Animation:
         """The moving mechanism of a cycle, which a notebook shows in its place and `.save("motion.html")` writes.

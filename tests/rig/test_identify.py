@@ -23,7 +23,7 @@ from trunnion.rig.reading.measurement import Accuracy, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.views.identify import KINDS
-from trunnion.views.shown import figure_of as figure
+from trunnion.views.shown import plot as figure
 
 FRICTION = "joint_defaults.friction.coefficient"
 SPEEDS = [{"A.speed": speed} for speed in (2.0, 4.0, 6.0, 8.0, 10.0)]

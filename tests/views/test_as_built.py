@@ -11,7 +11,7 @@ import trunnion
 from drawn import labels, line
 from trunnion.views.as_built import losses, seated
 from trunnion.views.scene import scene
-from trunnion.views.shown import figure_of
+from trunnion.views.shown import plot
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def cardan():
 
 @pytest.mark.slow
 def test_errors_are_those_of_the_result(slider):
-    place, slide = figure_of(slider, "error").axes
+    place, slide = plot(slider, "error").axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
     assert line(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
     assert place.get_ylabel() == "position error [µm]"
@@ -42,7 +42,7 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
     result = four_bar()
     (one,) = seated(result)
     assert (one.joint, one.kind, one.clearance, one.links) == ("B", "pin", pytest.approx(2e-5), ("crank", "coupler"))
-    axes = figure_of(result, "beta").axes
+    axes = plot(result, "beta").axes
     assert len(axes) == 1  # no β in the plane
     assert axes[0].lines[1].get_ydata() == pytest.approx(30.0)
 

@@ -18,7 +18,7 @@ from trunnion.rig.reading.measurement import Measurement
 from trunnion.views import draw
 from trunnion.views.charts import Plot
 from trunnion.views.compare import course, efficiencies, report
-from trunnion.views.shown import figure_of as figure
+from trunnion.views.shown import plot as figure
 
 POWERS = ("torque", "speed", "brake", "out")
 FRICTION = "joint_defaults.friction.coefficient"

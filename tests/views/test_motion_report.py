@@ -28,7 +28,7 @@ from trunnion.results.tables import columns
 from trunnion.views.motion import KINDS, OF_CONTACTS, shown
 from trunnion.views.report import motion_scene, report
 from trunnion.views.scene import scene
-from trunnion.views.shown import figure_of
+from trunnion.views.shown import plot
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}
 
@@ -122,13 +122,13 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
     law = {"law": "cycloidal", "range": [0.3, 1.2], "duration": 2.0, "returns": False}
     result = analyse(Mechanism(**{**data, "drivers": {"A": law}}), 20)
     wanted = 0.45 * (1 - np.cos(np.pi * result["time"].values))
-    (line,) = (one for one in figure_of(result, "speed").axes[0].lines if len(one.get_ydata()) == 20)
+    (line,) = (one for one in plot(result, "speed").axes[0].lines if len(one.get_ydata()) == 20)
     assert line.get_ydata() == pytest.approx(wanted, abs=1e-12)
     assert scene(result)["drivers"][0]["speed"] == pytest.approx(wanted, abs=1e-6)
     even = analyse(Mechanism(**data), 12)
     assert scene(even)["drivers"][0]["speed"] == []
     with pytest.raises(MechanismError, match="the speed of no driver varies"):
-        figure_of(even, "speed")
+        plot(even, "speed")
 
 
 @pytest.mark.sample(6)
@@ -136,7 +136,7 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in OF_CONTACTS])
 def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: str) -> None:
     name, result = motion
-    drawn = figure_of(result, kind)
+    drawn = plot(result, kind)
     drawn.canvas.draw()
     for axes in drawn.axes if kind != "phase" else ():
         labels = [text.get_text() for text in axes.get_legend().get_texts()] if axes.get_legend() else []
@@ -196,7 +196,7 @@ def rattled() -> xr.Dataset:
 
 
 def test_the_path_of_the_pin_lies_in_its_hole() -> None:
-    (axes,) = figure_of(rattled(), "orbit").axes
+    (axes,) = plot(rattled(), "orbit").axes
     (wall,), path = axes.patches, {len(line.get_xdata()): line for line in axes.lines}[701]
     assert wall.get_radius() == pytest.approx(500.0)  # µm
     assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.3)
@@ -205,7 +205,7 @@ def test_the_path_of_the_pin_lies_in_its_hole() -> None:
 
 def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
     result = trunnion.simulate(rattling_in_space(), duration=3e-4, steps=100)
-    panels = figure_of(result, "orbit").axes
+    panels = plot(result, "orbit").axes
     assert [axes.get_title(loc="left").partition(":")[0] for axes in panels] == ["Q.end_1", "Q.end_2"]
     for axes in panels:
         path = next(line for line in axes.lines if len(line.get_xdata()) == 101)

@@ -10,7 +10,7 @@ from trunnion import Mechanism, analyse
 from trunnion.cli.app import app
 from trunnion.errors import Status
 from trunnion.views.curves import ease, usual_peak, whole_peaks
-from trunnion.views.shown import figure_of
+from trunnion.views.shown import plot
 
 SLIDER_CRANK = """
 trunnion: 1
@@ -64,7 +64,7 @@ def test_a_short_working_stroke_is_shown_whole(kind):
     """Ten of 360 positions carry all of the load, far above the rest."""
     result = analyse(press(), 360)
     assert np.all(ease(result) == 1.0)
-    figure = figure_of(result, kind)
+    figure = plot(result, kind)
     for (low, high), most in zip(shown(figure), drawn(figure), strict=True):
         assert max(-low, high) >= most
     assert not any("outside" in text.get_text() for axes in figure.axes for text in axes.texts)
@@ -76,11 +76,11 @@ def test_what_grows_without_bound_at_a_dead_centre_is_cut_there_and_shown_on_dem
     near = ease(result) < 1.0
     assert near[-1]
     assert not near[:300].any()
-    figure = figure_of(result)
+    figure = plot(result)
     high, scale = figure.axes[0].get_ylim()[1], drawn(figure)[0] / np.nanmax(effort)
     assert np.nanmax(effort[~near]) * scale < high < np.nanmax(effort) * scale
     assert any("--uncut" in text.get_text() for text in figure.axes[0].texts)
-    whole = figure_of(whole_peaks(result))
+    whole = plot(whole_peaks(result))
     assert whole.axes[0].get_ylim()[1] >= drawn(whole)[0]
     assert not any("outside" in text.get_text() for text in whole.axes[0].texts)
 

@@ -15,7 +15,7 @@ from trunnion.errors import MechanismError, Status
 from trunnion.views.axis import abscissa
 from trunnion.views.cycle import PLOTS, READY, mechanism
 from trunnion.views.draw import save
-from trunnion.views.shown import figure_of
+from trunnion.views.shown import plot
 
 PLAIN = [name for name in PLOTS if name not in READY]  # of results without errors
 
@@ -27,9 +27,9 @@ def test_every_figure_of_every_result(name, case, tmp_path):
     kind, result = case
     if (name, kind) == ("mechanism", "nowhere"):
         with pytest.raises(MechanismError, match="nothing to draw"):
-            figure_of(result, name)
+            plot(result, name)
         return
-    figure = figure_of(result, name)
+    figure = plot(result, name)
     assert save(figure, tmp_path / "figure.png").stat().st_size > 5_000
     figure.set_layout_engine("none")  # it is arranged by now
     root = ElementTree.parse(save(figure, tmp_path / "figure.svg")).getroot()
@@ -47,7 +47,7 @@ def _curve(figure, label, panel=0):
 
 
 def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(plain, ideal):
-    figure = figure_of(plain, "torque", ideal=ideal)
+    figure = plot(plain, "torque", ideal=ideal)
     drawn = _curve(figure, "with friction")
     assert drawn[:-1, 1] == pytest.approx(plain.drive_effort.values[0] / 1000)
     assert (drawn[-1] == (pytest.approx(360.0), pytest.approx(drawn[0, 1]))).all()
@@ -58,7 +58,7 @@ def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(p
 def test_what_locks_at_every_position_is_drawn_as_it_is_without_friction():
     mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-10mm.yaml")
     locked, ideal = trunnion.analyse(mechanism, 12), trunnion.analyse(mechanism.with_friction("off"), 12)
-    panels = figure_of(locked, "reactions", ideal=ideal).axes
+    panels = plot(locked, "reactions", ideal=ideal).axes
     labels = [[curve.get_label() for curve in axes.lines] for axes in panels]
     assert [panel.count("without friction") for panel in labels] == [1, 1, 1]  # force, moment, load on an end
 
@@ -68,7 +68,7 @@ def test_the_range_of_an_effort_where_friction_rests_is_drawn():
     peak = float(np.abs(result["drive_effort"]).max())
     result["drive_effort_lower"] -= 0.4 * peak
     result["drive_effort_upper"] += 0.6 * peak
-    (bars,) = figure_of(result, "torque").axes[0].containers
+    (bars,) = plot(result, "torque").axes[0].containers
     assert bars.get_label() == "range, friction at rest"
     ends = np.array([segment[:, 1] for segment in bars[2][0].get_segments()])
     expected = np.transpose([result[f"drive_effort_{end}"].values[0] for end in ("lower", "upper")])
@@ -76,7 +76,7 @@ def test_the_range_of_an_effort_where_friction_rests_is_drawn():
 
 
 def test_a_gap_breaks_the_curve_and_names_its_cause():
-    figure = figure_of(four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)), "torque")
+    figure = plot(four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)), "torque")
     drawn = _curve(figure, "torque")
     assert np.isnan(drawn[132:229, 1]).all()
     assert np.isfinite(drawn[131, 1])
@@ -84,7 +84,7 @@ def test_a_gap_breaks_the_curve_and_names_its_cause():
 
 
 def test_friction_power_adds_up(plain):
-    figure = figure_of(plain, "friction-power")
+    figure = plot(plain, "friction-power")
     lines = {line.get_label().split(",")[0]: line.get_ydata() for line in figure.axes[0].lines}
     assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
 
@@ -108,7 +108,7 @@ def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
     of = {"stroke": "peak-to-peak", "far": "maximum", "near": "minimum"}
     data["measures"] = {name: {"slide": "S", "as": rule} for name, rule in of.items()} | {"swing": {"angle": "rod"}}
     result = trunnion.analyse(trunnion.Mechanism(**data), 36)
-    slide, angle = figure_of(result, "measures").axes
+    slide, angle = plot(result, "measures").axes
     assert slide.get_ylabel() == "slide of S [mm]"
     assert angle.get_ylabel() == "swing [°]"
     assert line(slide, "slide of S").get_ydata()[:-1] == pytest.approx(1e3 * result["measure_value"].values[0])
@@ -119,7 +119,7 @@ def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
 
 
 def test_a_shaft_that_turns_fully_ends_a_turn_further():
-    figure = figure_of(four_bar(72), "motion")
+    figure = plot(four_bar(72), "motion")
     crank = line(figure.axes[0], "crank").get_xydata()
     assert crank[-1] - crank[0] == pytest.approx([360.0, 360.0])
     rocker = line(figure.axes[0], "rocker").get_xydata()
@@ -143,7 +143,7 @@ def press():
 
 def test_margin_and_multiples_are_drawn_as_computed(press):
     found = trunnion.locking(press, STEPS)
-    upper, lower = figure_of(found, "locking").axes
+    upper, lower = plot(found, "locking").axes
     lines = {line.get_label(): line for line in upper.lines}
     margin = found["locking_margin"].values
     drawn = np.asarray(lines["locking margin, all friction"].get_ydata(), float)
@@ -159,7 +159,7 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
 def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     """Ends of the shaded ranges are those found between the positions."""
     found = trunnion.locking(trunnion.Mechanism.model_validate(HOIST), STEPS)
-    upper = figure_of(found, "locking").axes[0]
+    upper = plot(found, "locking").axes[0]
     spans = {patch.get_label(): patch for patch in upper.patches}
     limit = np.degrees(np.arccos(0.3))
     held = spans[LockingState.SELF_LOCKING_FORWARD.text]
@@ -172,7 +172,7 @@ def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
 def test_the_mechanism_is_drawn_at_a_place(press):
     cycle = trunnion.analyse(press, STEPS)
     place = cycle["drive"].values[12]
-    drawn = figure_of(cycle, "mechanism", at=float(place) / 1000)  # a plain number is SI
+    drawn = plot(cycle, "mechanism", at=float(place) / 1000)  # a plain number is SI
     assert f"{place:.4g} mm" in drawn.axes[0].get_title(loc="left")
     turning = trunnion.analyse(trunnion.read(EXAMPLES / "durango-fourbar.yaml"), 36)
-    assert "= 350°" in figure_of(turning, "mechanism", at="-10 deg").axes[0].get_title(loc="left")
+    assert "= 350°" in plot(turning, "mechanism", at="-10 deg").axes[0].get_title(loc="left")

@@ -15,10 +15,10 @@ from trunnion.results.tables import columns
 from trunnion.views.bodies import SYMBOLS, best, looking, scenery, solids, space
 from trunnion.views.cycle import PLOTS, READY, mechanism
 from trunnion.views.draw import save
-from trunnion.views.picture import facets
 from trunnion.views.report import report
 from trunnion.views.scene import scene, screw_axis
-from trunnion.views.shown import figure_of
+from trunnion.views.shown import plot
+from trunnion.views.sketch import facets
 
 BLANK = ("nowhere", "locked")  # no position can be drawn
 
@@ -36,9 +36,9 @@ def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
     kind, result = spatial
     if name == "mechanism" and kind in BLANK:
         with pytest.raises(MechanismError, match="nothing to draw"):
-            figure_of(result, name)
+            plot(result, name)
         return
-    figure = figure_of(result, name, ideal=result)
+    figure = plot(result, name, ideal=result)
     # in one format each: every figure comes up in both, and so does every result
     suffix = ("png", "svg")[([*PLOTS].index(name) + [*SPATIAL].index(kind)) % 2]
     assert 5_000 < save(figure, tmp_path / f"figure.{suffix}").stat().st_size < 3_000_000
@@ -62,7 +62,7 @@ def test_no_mechanism_is_seen_on_its_edge():
         flat[:, 2] *= 0.01
         object.__setattr__(shown, "spots", flat @ turn.T)
         object.__setattr__(shown, "joints", {})
-        seen = looking(*best(shown)).seen(shown.spots)[:, :2]
+        seen = (shown.spots @ looking(*best(shown)))[:, :2]
         true = np.prod(np.linalg.svd(shown.spots, compute_uv=False)[:2])
         assert np.prod(np.linalg.svd(seen, compute_uv=False)) > 0.3 * true
 
@@ -213,7 +213,7 @@ if shutil.which("node"):  # as in test_scene.py
         paths = page(result, tmp_path)["space"]["before"]["triad"]
         for path, axis in zip(paths, np.eye(3), strict=True):
             (x0, y0), _, (x1, y1) = (map(float, found) for found in re.findall(r"(-?[\d.]+),(-?[\d.]+)", path)[:3])
-            right, up, _ = camera.seen(axis)
+            right, up, _ = axis @ camera
             assert (x1 - x0, y0 - y1) == (pytest.approx(26 * right, abs=0.2), pytest.approx(26 * up, abs=0.2))
 
 

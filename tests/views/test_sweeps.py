@@ -11,7 +11,7 @@ from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 import trunnion
 from drawn import texts
 from trunnion import Status, save
-from trunnion.views.shown import figure_of as figure
+from trunnion.views.shown import plot as figure
 from trunnion.views.sweep import arrange, tables
 
 EXAMPLES = File(__file__).parents[2] / "examples"

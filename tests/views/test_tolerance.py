@@ -18,7 +18,7 @@ from trunnion.views import draw
 from trunnion.views.allocation import trade_off
 from trunnion.views.charts import Band, Rule
 from trunnion.views.readings import readings, share_interval
-from trunnion.views.shown import figure_of as figure
+from trunnion.views.shown import plot as figure
 from trunnion.views.tolerance import KINDS, MOST_PANELS, corners, histogram, indices, inputs, overview, tables
 
 

@@ -81,7 +81,7 @@ def plot(
     from trunnion.views.curves import check_kind, whole_peaks
     from trunnion.views.cycle import PLOTS, drawable
     from trunnion.views.draw import save
-    from trunnion.views.shown import figure_of
+    from trunnion.views.shown import plot
 
     for name in kind or []:
         check_kind(name, PLOTS)
@@ -96,7 +96,7 @@ def plot(
     if not single:
         folder(out)
     drawn = whole_peaks(result, uncut)
-    for name, picture in [(name, figure_of(drawn, name, ideal=ideal, at=at)) for name in kind or drawable(result)]:
+    for name, picture in [(name, plot(drawn, name, ideal=ideal, at=at)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{format_.lstrip('.')}"
         save(picture, path)
         wrote(path)
@@ -107,13 +107,13 @@ def plot(
 def report(model: Model, out: Path, settled: Friction, steps: int = 360, uncut: bool = False) -> None:
     """Write an HTML report: animation, plots, findings, inputs."""
     from trunnion.views.curves import whole_peaks
-    from trunnion.views.shown import report_of
+    from trunnion.views.shown import report
 
     check_target(out, "--out", "a report", PAGES)
     mechanism = model.read()
     with model.lines():
         result = _analysed(mechanism, steps, settled.checked())
-    write_text(report_of(whole_peaks(result.dataset, uncut), ideal=_ideal(mechanism, steps)), out)
+    write_text(report(whole_peaks(result.dataset, uncut), ideal=_ideal(mechanism, steps)), out)
     wrote(out)
     raise Exit(exit_status(findings_of(result)))
 

@@ -145,18 +145,18 @@ class Shown:
         for path in files.out or ():
             if path.suffix.lower() in IMAGES:
                 from trunnion.views.draw import save as save_figure
-                from trunnion.views.shown import figure_of
+                from trunnion.views.shown import plot
 
-                save_figure(figure_of(self.pictured, **self.drawn), path)
+                save_figure(plot(self.pictured, **self.drawn), path)
             else:
                 from trunnion.results.save import save
 
                 save(self.dataset, path, files.units_row, files.columns, files.units)
             self.written.append(path)
         if files.report is not None:
-            from trunnion.views.shown import report_of
+            from trunnion.views.shown import report
 
-            write_text(report_of(self.pictured, **self.paged), files.report)
+            write_text(report(self.pictured, **self.paged), files.report)
             self.written.append(files.report)
 
     def write_model(self, mechanism: Mechanism, path: Path, over: bool) -> None:

@@ -201,11 +201,30 @@ class Reading:
         """The figure, SI, and its deviations; NaN where a part of the courses has no answer. times: to be shown, s."""
         gone = np.any(np.isnan(primal(panels.coefficients)[..., 0]), axis=0)
         lost = np.any(gone, axis=1)
-        figure, least, most, time = self._of_rule(panels)
-        if self.measure.wants_margin and self.measure.rule != "deviation":
-            figure = self._to_the_end(panels, figure)
+        rule, (courses, of) = self.measure.rule, self.number(panels)
+        if rule in ("deviation", "largest", "maximum", "minimum"):
+            tops = [courses.top(of, sign) for sign in SIGNS.get(rule, BOTH)]
+            sides = [self._beside(courses, top) for top in tops]
+            most, least = tops[0].value, tops[-1].value
+            figure, time = most, sides[0]
+            if len(tops) == 2:
+                figure = namespace(most, least).maximum(-least, most)
+                time = np.where(primal(most) >= -primal(least), *sides)
+        else:
+            figure = self._figure(courses, of)
+            time = np.full(np.shape(primal(figure)), np.nan)
+        if self.measure.wants_margin and rule != "deviation":
+            # of places at which the margin is not looked for so far ∞ of an extreme, and of a mean where it is so all
+            # along; NaN of others
+            end = MARGIN * (1 - NARROW)
+            lowest, highest = (primal(panels.top(first, sign).value) for sign in (-1.0, 1.0))
+            within = ((lowest if rule.endswith("minimum") else highest) < end) | (rule == "dwell")
+            endless = (rule in ("maximum", "largest", "value")) | (lowest >= end) & (rule in ("minimum", "mean", "rms"))
+            figure = selected(within, figure, np.where(endless, np.inf, np.nan))
             moving = np.isfinite(primal(figure)) | (primal(figure) != self.nominal)
             least = most = selected(moving, figure - self.nominal, 0.0)
+        elif rule != "deviation":
+            least = most = figure - self.nominal
         figure, least, most = (selected(~lost, number, np.nan) for number in (figure, least, most))
         shown: Number = np.zeros((len(status), 0))
         if len(self.ends) == 1:
@@ -249,33 +268,7 @@ class Reading:
         panels, of = self.number(panels)
         return of(panels.at(time, period))
 
-    def _to_the_end(self, panels: Panels, figure: Number) -> Number:
-        """A figure of the locking margin where it is of places at which that is not looked for: ∞ of an extreme, and
-        of a mean where it is so all along; NaN of others."""
-        rule, end = self.measure.rule, MARGIN * (1 - NARROW)
-        lowest, highest = (primal(panels.top(first, sign).value) for sign in (-1.0, 1.0))
-        within = ((lowest if rule.endswith("minimum") else highest) < end) | (rule == "dwell")
-        past_end = (rule in ("maximum", "largest", "value")) | (lowest >= end) & (rule in ("minimum", "mean", "rms"))
-        return selected(within, figure, np.where(past_end, np.inf, np.nan))
-
     # ---- rules --------------------------------------------------------------------------------------------
-
-    def _of_rule(self, panels: Panels) -> tuple[Number, Number, Number, Array]:
-        """Figure, deviations and time, wherever the courses have an answer."""
-        rule, (panels, of) = self.measure.rule, self.number(panels)
-        if rule not in ("deviation", "largest", "maximum", "minimum"):
-            figure = self._figure(panels, of)
-            return figure, figure - self.nominal, figure - self.nominal, np.full(np.shape(primal(figure)), np.nan)
-        tops = [panels.top(of, sign) for sign in SIGNS.get(rule, BOTH)]
-        times = [self._beside(panels, top) for top in tops]
-        most, least = tops[0].value, tops[-1].value
-        figure, time = most, times[0]
-        if len(tops) == 2:
-            figure = namespace(most, least).maximum(-least, most)
-            time = np.where(primal(most) >= -primal(least), *times)
-        if rule == "deviation":
-            return figure, least, most, time * np.nan
-        return figure, figure - self.nominal, figure - self.nominal, time
 
     def _figure(self, panels: Panels, of: Made) -> Number:
         """The figure of a rule that is of no single place of the course."""

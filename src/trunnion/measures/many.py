@@ -614,9 +614,8 @@ class Many:
         self.run, self.measures, self.values, self._kernels = run, tuple(measures), values, kernels
         self.figures: dict[str, float] = {}
         self.times: dict[str, float] = {}
-        self._groups = [
-            Group(run, group, ends, values, kernels(group), self.figures) for ends, group in together(run, measures)
-        ]
+        groups = together(run, measures)
+        self._groups = [Group(run, group, ends, values, kernels(group), self.figures) for ends, group in groups]
         self.tune(values)
 
     def tune(self, values: Values) -> None:

@@ -23,22 +23,26 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle.locking import locks_of, margins_without
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.measures.measures import chosen, outputs
 from trunnion.model.file import text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of
 from trunnion.results.dataset import Column, without_noise
+from trunnion.results.quantities import quantity
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.run import prepare
+from trunnion.solve.shifts import play_of
+from trunnion.studies.design import instant_centres, transmission_angles
 from trunnion.studio import changing, drawing
 from trunnion.studio.findings import cures, figures, margin_of, missing, reached, readiness, remedied, sentence, spoken
-from trunnion.studio.layers import centres_of, corner_of, measured, seats_of, transmission_of
-from trunnion.studio.live import Live, live_in_space, places_at, thumbnail, tracks, uncollected
+from trunnion.studio.live import Live, columns, live_in_space, places_at, thumbnail, tracks, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded, columns_of
-from trunnion.studio.message import packed
+from trunnion.studio.message import Exact, packed
 from trunnion.studio.sketch import Sketch, refused
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
+from trunnion.views.as_built import seated
 from trunnion.views.bodies import gathered
 from trunnion.views.scene import blocks_of, scene
 
@@ -49,6 +53,7 @@ __all__ = ["ANSWERS", "answer"]
 
 MOST_OTHERS = 3  # assemblies
 FILES = {"csv": "text/csv", "report": "text/html", "png": "image/png", "svg": "image/svg+xml"}
+MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground
 MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
 
 
@@ -125,7 +130,13 @@ def _model(question: Asked) -> dict[str, Any]:
     }  # fmt: skip
     if result is None:
         return head
-    drawn_scene = scene(result, max_positions=MOST_STEPS)
+    drawn_scene, system = scene(result, max_positions=MOST_STEPS), state.run.system
+    mechanism = system.mechanism
+    # what has a worst corner: none where nothing has a tolerance or a play; joints whose pins lie nowhere in their play
+    loose = [name for name, (kind, _) in system.joints.items()
+             if play_of(mechanism.space, kind, state.run.values, name) is not None]  # fmt: skip
+    varies = loose or mechanism.tolerated()
+    measures = (chosen(mechanism, None, state.run.values) or outputs(system)) if varies else []
     return head | {
         "scene": drawn_scene,
         "places": {key: place for key, track in drawn_scene["points"].items()
@@ -134,7 +145,8 @@ def _model(question: Asked) -> dict[str, Any]:
         "locks": locks_of(state.run, result["time"].values, result["status"].values),
         **({"margin_why": "friction lacks something"} if state.bare and question.friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
-        **measured(state.run),
+        "worst": [measure.name for measure in measures],
+        "unseated": [name for name in loose if name not in mechanism.seated],
     }  # fmt: skip
 
 
@@ -323,13 +335,28 @@ def _layers(question: Asked) -> dict[str, Any]:
     cycle, run, layers_wanted = question.cycle, question.state.run, set(question.get("wanted") or ())
     layers: dict[str, Any] = _columns(cycle.columns, question)
     if run.system.mechanism.space == "planar":
-        if "seats" in layers_wanted:
-            layers["seats"] = seats_of(cycle.motion)
-        if layers_wanted & {"centres", "transmission"}:
-            with np.errstate(all="ignore"):
-                walk = run.walk(run.cycle.times(question.steps))
-            makers = {"centres": centres_of, "transmission": transmission_of}
-            layers |= {name: tell(walk, question.steps) for name, tell in makers.items() if name in layers_wanted}
+        if "seats" in layers_wanted:  # at each end offset of the pin from the middle of its hole and force on that
+            layers["seats"] = [
+                {"joint": seat.joint, "kind": seat.kind, "clearance": seat.clearance, "length": seat.length,
+                 "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
+                           for what, rows in (("offset", offset), ("force", force))}
+                          for offset, force in zip(seat.offsets, seat.forces, strict=True)]}
+                for seat in seated(cycle.motion)
+            ]  # fmt: skip
+        with np.errstate(all="ignore"):
+            walk = run.walk(run.cycle.times(question.steps))
+            if "centres" in layers_wanted:
+                layers["centres"] = [
+                    {**vars(row), "ground": run.system.mechanism.fixed_link in row.pair,
+                     "far": row.far and dict(zip("xy", row.far, strict=True))}
+                    for row in instant_centres(walk, question.steps, MOST_LINKS)
+                ]  # fmt: skip
+            if "transmission" in layers_wanted:  # at the middle joint of each dyad
+                middle = {"-".join(module.joints): module.joints[1:2] for module in run.system.plan.modules}
+                angles = transmission_angles(walk)
+                rows = zip(angles, columns(list(angles.values()), question.steps), strict=True)
+                layers["transmission"] = [{"name": name, "joint": joint, "angle": angle}
+                                          for name, angle in rows for joint in middle[name]]  # fmt: skip
     return layers
 
 
@@ -405,10 +432,51 @@ def _export(question: Asked) -> dict[str, Any]:
     return {"name": name, "mime": FILES[what], "bytes": content}
 
 
+@np.errstate(all="ignore")
 def _corner(question: Asked) -> dict[str, Any]:
-    """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    mechanism = question.cycle.run.system.mechanism
-    return corner_of(mechanism, str(question["measure"]), question.get("side"), question.steps)
+    """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both.
+
+    Returns
+    -------
+    dict
+        values: least and largest deviation, SI, and their texts; side: the shown one, 0 or 1; index, at: position
+        nearest to where it stands, and that in words, None of a figure of the whole cycle; rows: numbers that matter,
+        [name, nominal, change]; scene: of the mechanism there, its errors being those against the nominal one, with its
+        holes as wide as they are. Its places alone count: it is solved without friction, with which it might lock.
+    """
+    from trunnion.cycle.positions import positions
+    from trunnion.cycle.summary import result_of
+    from trunnion.studies.tolerance.linear import worst_corner  # it takes long to load
+
+    def signed(value: float, unit: str) -> str:
+        return f"{'−' if value < 0 else '+'}{quantity(abs(float(value)), unit)}"
+
+    steps, mechanism = question.steps, question.cycle.run.system.mechanism
+    corner = worst_corner(mechanism, str(question["measure"]), question.get("side"))
+    run, time, inputs = corner.prepared.run, corner.time, corner.prepared.inputs
+    over_cycle, bare = not np.isfinite(time), prepare(mechanism.with_friction("off"))
+    there = replace(bare, values={**bare.values, **corner.numbers})
+    # its pins lie where the corner has them
+    there.__dict__.update(ideal=replace(there, values=inputs.nominal), erring=True, seats=[])
+    result = result_of(there, positions(there, steps, margin=False, averaged=False)).dataset
+    drawn_scene = scene(result, max_positions=steps)
+    for joint in inputs.loose:
+        play, links = inputs.play(joint, corner.numbers), run.system.joints[joint][1]
+        guide = play.model.size is not None and play.model.size[0] == "guide"
+        drawn_scene["built"]["seats"].append({
+            "joint": joint, "kind": "guide" if guide else "pin", "clearance": float(np.ravel(primal(play.radii[0]))[0]),
+            "length": float(np.ravel(primal(play.length))[0]) if guide else None, "links": list(links), "ends": [],
+        })  # fmt: skip
+    return {
+        "values": list(corner.deviations),
+        "texts": [signed(value, corner.unit) for value in corner.deviations],
+        "side": corner.side,
+        "index": None if over_cycle else int(np.argmin(np.abs(run.cycle.times(steps) - time))),
+        "at": None if over_cycle else run.system.dial(run.values, np.array([time])).at(0),
+        "rows": [[path, quantity(nominal, unit), signed(value - nominal, unit)]
+                 for path, unit, nominal, value in corner.rows],
+        "scene": drawn_scene,
+    }  # fmt: skip
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {

@@ -96,9 +96,8 @@ def delete(sketch: Sketch, gesture: Fields) -> str:
     if section == "points":
         link, name = free(sketch, name)
         del sketch.section("links")[link]["points"][name]
-    elif (
-        section in SIDES and in_loop
-    ):  # a joint goes with the link after it, that before it where the ground comes after
+    elif section in SIDES and in_loop:
+        # a joint goes with the link after it, that before it where the ground comes after
         (index, row), *_ = in_loop
         if len(sketch.rows) < 3 or (section, name) == ("links", sketch.ground):
             raise refused("cannot go: the loop would not close", name, "change its type, twist or distance")

@@ -240,11 +240,15 @@ def thumbnail(text: str) -> dict[str, Any]:
 
     Of mechanisms in space a parallel projection.
     """
-    state = loaded(text)
+    state, places = loaded(text), dict[str, Array]()
     try:
-        places = {key: _projected(*track.values()) for key, track in tracked(state, SMALL_STEPS).items()}
+        for key, (x, y, *z) in ((key, track.values()) for key, track in tracked(state, SMALL_STEPS).items()):
+            places[key] = np.array([x, y])
+            if z:  # seen from the side and from above
+                across, depth = cos(TURNED) * x + sin(TURNED) * y, cos(TURNED) * y - sin(TURNED) * x
+                places[key] = np.array([across, cos(TILTED) * z[0] + sin(TILTED) * depth])
     except MechanismError:
-        places = {}
+        pass
     complete = np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0) if places else [False]
     if not np.any(complete):
         return {"links": [], "paths": []}
@@ -258,11 +262,3 @@ def thumbnail(text: str) -> dict[str, Any]:
         "links": [{"ground": link == ground, "points": points} for link, points in links.items()],
         "paths": [{"x": x, "y": y} for x, y in moved if np.ptp(x) + np.ptp(y) > 0],
     }  # fmt: skip
-
-
-def _projected(x: Array, y: Array, z: Array | None = None) -> Array:
-    """A track as it is drawn, (2, position): in space seen from the side and from above."""
-    if z is None:
-        return np.array([x, y])
-    across, depth = cos(TURNED) * x + sin(TURNED) * y, cos(TURNED) * y - sin(TURNED) * x
-    return np.array([across, cos(TILTED) * z + sin(TILTED) * depth])

@@ -250,9 +250,8 @@ class Sketch:
         places = {point: to if point in moving else old.out(local[point]) for point in local}
         for first, second in combinations(local if link != self.ground else (), 2):
             if abs(places[first] - places[second]) <= SHORT * self.size < abs(local[first] - local[second]):
-                raise refused(
-                    f"would have no length: {first} would lie on {second}", f"links.{link}", "keep them apart"
-                )
+                what = f"would have no length: {first} would lie on {second}"
+                raise refused(what, f"links.{link}", "keep them apart")
         origin = next((point for point in pins if local[point] == 0), None)
         ahead = next((point for point in pins if local[point].imag == 0 and local[point] != 0), None)
         slots = [name for name in slides if self.joints[name]["links"][0] == link]

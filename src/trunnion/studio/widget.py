@@ -57,23 +57,21 @@ class StudioWidget(anywidget.AnyWidget):
                 self.text = asked["text"]
             status, body = 200, answer(question.encode())
         else:
-            status, body = self._request(str(message.get("path")), bytes(buffers[0]) if buffers else b"")
+            # what the server answers of its files and studies: a folder of one file, and no studies
+            kind, sent = str(message.get("path")).strip("/").partition("/")[0], bytes(buffers[0]) if buffers else b""
+            status, reply = 200, dict[str, Any]()
+            if kind == "files":
+                digest = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
+                reply = {"folder": "notebook", "id": digest, "open": NAME, "files": [NAME]}
+            elif kind == "file":
+                self.text = str(json.loads(sent)["text"]) if sent else self.text
+                reply = {"saved": NAME} if sent else {"text": self.text}
+            elif kind == "jobs":
+                reply = {"forms": [], "jobs": []}
+            else:
+                status, reply = 404, {"error": "A notebook does not do that: use the command line."}
+            body = json.dumps(reply).encode()
         self.send({"id": message["id"], "status": status}, [body])
-
-    def _request(self, path: str, body: bytes) -> tuple[int, bytes]:
-        """What the server answers of its files and studies: a folder of one file, and no studies."""
-        kind, status, reply = path.strip("/").partition("/")[0], 200, dict[str, Any]()
-        if kind == "files":
-            digest = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
-            reply = {"folder": "notebook", "id": digest, "open": NAME, "files": [NAME]}
-        elif kind == "file":
-            self.text = str(json.loads(body)["text"]) if body else self.text
-            reply = {"saved": NAME} if body else {"text": self.text}
-        elif kind == "jobs":
-            reply = {"forms": [], "jobs": []}
-        else:
-            status, reply = 404, {"error": "A notebook does not do that: use the command line."}
-        return status, json.dumps(reply).encode()
 
 
 def studio(mechanism: Mechanism, height: int = 720) -> StudioWidget:

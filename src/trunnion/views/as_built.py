@@ -157,23 +157,19 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         return row(label, value, float(np.nanmax(other)) if np.isfinite(other).any() else np.nan, unit, place)
 
     rows += [largest(f"Position error of {key}, largest", "m", size) for key, size in worst_points(result).items()]
-    rows += [
-        largest(f"Transmission error, {text}, largest", unit, error) for text, unit, error in outputs(result).values()
-    ]
+    rows += [largest(f"Transmission error, {of}, largest", unit, error) for of, unit, error in outputs(result).values()]
     efforts, changes = (members(result, f"drive_effort{end}", "driver") for end in ("", "_change"))
     for (driver, effort), unit in zip(efforts.items(), units_along(result["drive_effort"], "driver"), strict=True):
         noun = "force" if unit == "N" else "torque"
-        rows.append(
-            largest(f"Drive {noun} of {driver}, largest", unit, np.abs(effort), np.abs(effort - changes[driver]))
-        )
+        sizes = np.abs(effort), np.abs(effort - changes[driver])
+        rows.append(largest(f"Drive {noun} of {driver}, largest", unit, *sizes))
     forces, changes = (members(result, f"reaction_force{end}", "joint") for end in ("", "_change"))
     for joint, force in forces.items():
-        sizes = (np.linalg.norm(vector, axis=0) for vector in (force, force - changes[joint]))
+        sizes = np.linalg.norm(force, axis=0), np.linalg.norm(force - changes[joint], axis=0)
         rows.append(largest(f"Reaction of {joint}, largest", "N", *sizes))
     lost, ideally = (float(sum(members(result, f"friction_power_mean{of}", "joint").values())) for of in ("", "_ideal"))
-    built, free = (
-        np.nan if (value := column(result, f"efficiency{of}")) is None else float(value) for of in ("", "_ideal")
-    )
+    etas = (column(result, f"efficiency{of}") for of in ("", "_ideal"))
+    built, free = (np.nan if eta is None else float(eta) for eta in etas)
     return [*rows, row("Friction power, mean", lost, ideally, "W"), row("Efficiency of the cycle", built, free, "1")]
 
 

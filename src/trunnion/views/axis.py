@@ -99,6 +99,23 @@ def _layout(text: str) -> dict[str, Any]:
     return empty | facts
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """What a drawing is of. stated: its layout, see `layout`."""
+
+    stated: dict[str, Any]
+
+    @property
+    def ground(self) -> str:
+        """The name of the fixed link."""
+        return str(self.stated["ground"])
+
+    @property
+    def moving(self) -> list[str]:
+        """The names of the other links."""
+        return [link for link in self.stated["links"] if link != self.ground]
+
+
 def is_spatial(result: xr.Dataset) -> bool:
     """Whether a result is of a mechanism in space."""
     return layout(result).get("space") == "spatial"

@@ -23,7 +23,7 @@ from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.views.axis import Array, layout, members, numbers
+from trunnion.views.axis import Array, Drawn, layout, members, numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,34 +67,22 @@ class BodyPose:
 
 
 @dataclass(frozen=True)
-class Space:
+class Space(Drawn):
     """What is needed to draw a spatial result at any position.
 
-    stated: the layout; poses: of every link; free: "link.point" → place in the link's frame, of points that are no
+    poses: of every link; free: "link.point" → place in the link's frame, of points that are no
     joints; thickest: radius of the thickest pin, 0 if none is told, m.
     """
 
-    stated: dict[str, Any]
     poses: dict[str, BodyPose]
     free: dict[str, Array]
     thickest: float = 0.0
 
-    @property
-    def ground(self) -> str:
-        """The name of the fixed link."""
-        return str(self.stated["ground"])
-
-    @property
-    def moving(self) -> list[str]:
-        """The names of the other links."""
-        return [link for link in self.stated["links"] if link != self.ground]
-
     @cached_property
     def joints(self) -> dict[str, dict[str, Any]]:
         """The joints whose links have poses."""
-        return {
-            name: entry for name, entry in self.stated["joints"].items() if set(entry["links"]) <= self.poses.keys()
-        }
+        joints = self.stated["joints"].items()
+        return {name: entry for name, entry in joints if set(entry["links"]) <= self.poses.keys()}
 
     def element(self, joint: str, side: int) -> Array:
         """Point, z and x of a joint's element on its first (0) or second (1) link, rows (3, 3), in the link's frame."""
@@ -512,23 +500,15 @@ SIDES = [side + off for side in (-135.0, -45.0, 45.0, 135.0) for off in range(-2
 MOST_SPOTS = 3000  # that are weighed
 
 
-@dataclass(frozen=True)
-class Camera:
-    """Rows of `matrix`: right, up and towards the viewer, in the global frame."""
+def looking(around: float, above: float) -> Array:
+    """A camera at an angle around z (0: on the x axis, rad) and above the x–y plane; z points up in the picture.
 
-    matrix: Array
-
-    def seen(self, points: Array) -> Array:
-        """Right, up and towards the viewer (m) of points (…, 3)."""
-        return np.asarray(points @ self.matrix.T, dtype=float)
-
-
-def looking(around: float, above: float) -> Camera:
-    """The camera at an angle around z (0: on the x axis, rad) and above the x–y plane; z points up in the picture."""
+    Its columns are right, up and towards the viewer, in the global frame: points (…, 3) times it are as they are seen.
+    """
     c, s = np.cos(around), np.sin(around)
     towards = np.array([np.cos(above) * c, np.cos(above) * s, np.sin(above)])
     right = np.array([-s, c, 0.0])
-    return Camera(np.array([right, np.cross(towards, right), towards]))
+    return np.array([right, np.cross(towards, right), towards]).T
 
 
 def best(bodies: Space) -> tuple[float, float]:
@@ -544,7 +524,7 @@ def best(bodies: Space) -> tuple[float, float]:
     scores = {}
     for above in np.radians(HEIGHTS):
         for around in np.radians(SIDES):
-            x, y, _ = looking(around, above).seen(spots).T
+            x, y, _ = (spots @ looking(around, above)).T
             spread = np.linalg.det(np.cov(x, y)) if len(spots) > 2 else 0.0
             gentle = 1.0 - 0.15 * (1 - np.cos(around + np.radians(60))) / 2 - 0.1 * abs(above - np.radians(28))
             scores[float(around), float(above)] = np.sqrt(max(spread, 0.0)) * gentle + 1e-9 * gentle
@@ -560,7 +540,7 @@ class Scenery:
 
     shown: Space
     solids: list[Solid]
-    camera: Camera
+    camera: Array
     box: tuple[float, float, float, float]
 
     @property
@@ -570,9 +550,9 @@ class Scenery:
         return float(np.hypot(right - left, above - below))
 
 
-def scenery(bodies: Space, camera: Camera | None = None) -> Scenery:
+def scenery(bodies: Space, camera: Array | None = None) -> Scenery:
     """Look at a mechanism, from the best side if not told."""
-    camera = camera or looking(*best(bodies))
+    camera = looking(*best(bodies)) if camera is None else camera
     shapes = solids(bodies)
     corners = []
     picked = np.flatnonzero(bodies.drawable)
@@ -583,7 +563,7 @@ def scenery(bodies: Space, camera: Camera | None = None) -> Scenery:
         if solid.kind == "box":
             points = points[0] + np.array(list(product((-1.0, 1.0), repeat=3))) @ points[1:]
         places = np.einsum("ijn,kj->nki", pose.matrix[:, :, picked], points) + pose.origin[:, picked].T[:, None]
-        projected = camera.seen(places.reshape(-1, 3))[:, :2]
+        projected = places.reshape(-1, 3) @ camera[:, :2]
         corners += [projected.min(axis=0) - solid.radius, projected.max(axis=0) + solid.radius]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     return Scenery(bodies, shapes, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))

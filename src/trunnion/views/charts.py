@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.views.axis import Abscissa, Array
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

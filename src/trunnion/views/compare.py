@@ -116,12 +116,9 @@ def verdict(result: xr.Dataset, channel: int, condition: int) -> str:
 
 def settings(result: xr.Dataset) -> list[Scale]:
     """The numbers that were set, over the conditions, in the units that the model states them in."""
-    return [
-        Scale(name, SIGNS.get(unit, "" if unit == "1" else unit), values / factor + 0.0)
-        for name, (unit, factor), values in zip(
-            names(result, "set"), attribute(result, "set_written"), result["value"].values, strict=True
-        )
-    ]
+    rows = zip(names(result, "set"), attribute(result, "set_written"), result["value"].values, strict=True)
+    return [Scale(name, SIGNS.get(unit, "" if unit == "1" else unit), values / factor + 0.0)
+            for name, (unit, factor), values in rows]  # fmt: skip
 
 
 def levels(values: Array) -> Array:
@@ -249,10 +246,8 @@ def explained(result: xr.Dataset, channel: int | None = None) -> list[Table]:
 def verdicts(result: xr.Dataset) -> Table:
     """The verdict of every channel in every condition."""
     channels, (head, short) = names(result, "channel"), shortened(names(result, "condition"))
-    rows = [
-        [name, *(verdict(result, i, k) if result["turns"].values[i, k] else NONE for i in range(len(channels)))]
-        for k, name in enumerate(short)
-    ]
+    rows = [[name, *(verdict(result, i, k) if result["turns"].values[i, k] else NONE for i in range(len(channels)))]
+            for k, name in enumerate(short)]  # fmt: skip
     return Table("verdicts", [head, *channels], rows)
 
 

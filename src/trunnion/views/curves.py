@@ -130,9 +130,7 @@ def ease(result: xr.Dataset) -> Array:
         return ease_of_status(result, status)
     condition, margin = np.asarray(result["condition"].values, float), column(result, "locking_margin")
     finite = condition[np.isfinite(condition)]
-    friction = np.ones(
-        status.size
-    )  # by how much friction that feeds on its own reactions raises them: ∞ where it locks
+    friction = np.ones(status.size)  # how it feeds on its own reactions raises them: ∞ where it locks
     if margin is not None:
         more = 1.0 / np.maximum(margin - 1.0, 1e-300)
         friction = np.where(np.isinf(margin), 1.0, np.where(margin > 1.0, 1.0 + more, 1.0))

@@ -272,9 +272,8 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
                  Look("limit", 0.9, "dotted", order=1.4)) for k, place in enumerate(places)]  # fmt: skip
     # the scale is that of all points: those that are not drawn err less
     scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
-    charts = [
-        over_drive(result, "position error", "m", worst_points(result), scale=scale, marks=lost, legend=Legend(1))
-    ]
+    worst = worst_points(result)
+    charts = [over_drive(result, "position error", "m", worst, scale=scale, marks=lost, legend=Legend(1))]
     for unit, noun in (("rad", "rotation"), ("m", "slide")):
         if errors := {joint: error for joint, (_, unit_of, error) in outputs(result).items() if unit_of == unit}:
             title = f"transmission error,\n{noun}"
@@ -463,21 +462,10 @@ def _states(result: xr.Dataset, named: bool) -> list[Mark]:
 
 
 def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
-    """The mechanism at a position, with coupler curves, joints named.
+    """The mechanism at a position, see `sketch.mechanism`."""
+    from trunnion.views.sketch import mechanism as drawing  # with matplotlib, which is slow to import
 
-    If the position is not told: in the plane a telling one, with ghosts; in space that of the largest reaction.
-    """
-    count = result.sizes["position"]
-    if index is not None and not 0 <= index < count:
-        remedy = f"name one from 0 to {count - 1}"
-        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
-    if is_spatial(result):
-        from trunnion.views.picture import mechanism as picture
-
-        return picture(result, index)
-    from trunnion.views.sketch import mechanism as sketch
-
-    return sketch(result, index)
+    return drawing(result, index)
 
 
 PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {

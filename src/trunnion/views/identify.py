@@ -121,13 +121,8 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
 
 def tables(result: xr.Dataset) -> list[Table]:
     """The estimates, how they go together, how the model fits, and what was held out."""
-    return [
-        estimated(result),
-        *correlations(result),
-        *residuals(result, True),
-        *residuals(result, False),
-        *sensors(result),
-    ]
+    fit = [table for fitted in (True, False) for table in residuals(result, fitted)]
+    return [estimated(result), *correlations(result), *fit, *sensors(result)]
 
 
 def estimated(result: xr.Dataset) -> Table:
@@ -207,11 +202,8 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Plot:
             raise MechanismError(Finding(what, "--kind", "see the table of residuals"))
         picked = [every[k] for k in thinned(len(every), MOST_PANELS)]
         more = f", {len(picked)} of {len(every)} curves" if len(picked) < len(every) else ""
-        panels = [
-            panel
-            for n, (i, k) in enumerate(picked)
-            for panel in _residual_panels(result, i, k, n == 0, n == len(picked) - 1)
-        ]
+        panels = [panel for n, (i, k) in enumerate(picked)
+                  for panel in _residual_panels(result, i, k, n == 0, n == len(picked) - 1)]  # fmt: skip
         return Plot(f"Residuals, before and after{more}", panels, 2)
     panels = [_interval(row, Legend(1) if k == 0 else None) for k, row in enumerate(estimates(result))]
     return Plot("Estimates with their 95 % intervals", panels)

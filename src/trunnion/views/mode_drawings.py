@@ -14,9 +14,10 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, choices, put_together
 from trunnion.solve.run import prepare
-from trunnion.views import picture, sketch
+from trunnion.views import sketch
 from trunnion.views.assembly import some
-from trunnion.views.bodies import Camera, Scenery, best, looking, scenery, space
+from trunnion.views.axis import Array
+from trunnion.views.bodies import Scenery, scenery, space
 from trunnion.views.draw import INK, MUTED, RULE, Labels, new, plain
 
 if TYPE_CHECKING:
@@ -90,12 +91,12 @@ def _run(mechanism: Mechanism, choice: GroupModes, mode: AssemblyMode) -> xr.Dat
         return analyse(Mechanism(**{**data, "assembly": {key: data["assembly"][key] for key in hints}}), STEPS)
 
 
-def _drawing(result: xr.Dataset, choice: GroupModes, camera: Camera | None) -> tuple[sketch.Picture | Scenery, int]:
+def _drawing(result: xr.Dataset, choice: GroupModes, camera: Array | None) -> tuple[sketch.Picture | Scenery, int]:
     """What draws a result, in space from a camera or the best side, and the position at which its group is chosen."""
     usable = np.arange(result.sizes["position"])
     if "link_rotation" in result:
         bodies = space(result)
-        drawing: sketch.Picture | Scenery = scenery(bodies, camera or looking(*best(bodies)))
+        drawing: sketch.Picture | Scenery = scenery(bodies, camera)
         usable = np.flatnonzero(bodies.drawable)
     else:
         drawing = replace(sketch.picture(result), weight=0.5, only=choice.links)
@@ -112,8 +113,8 @@ def _draw(axes: Axes, choice: GroupModes, cell: Cell, size: float, labels: Label
     if drawing is None:
         remark = "cannot be assembled in this mode"
     elif isinstance(drawing, Scenery):
-        picture.sketch(axes, drawing, index, choice.links)
-        picture.name_joints(axes, drawing, index, labels, tuple(mode.joints), 7.5)
+        sketch.paint(axes, drawing, index, choice.links)
+        sketch.name_joints(axes, drawing, index, labels, tuple(mode.joints), 7.5)
     else:
         symbols, none = replace(drawing, size=size), np.zeros(index + 1)
         sketch.sketch(axes, symbols, index)

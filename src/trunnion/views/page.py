@@ -252,39 +252,32 @@ def _functions(entry: str, read: Read, libraries: Collection[str]) -> dict[str, 
     def collect(name: str, path: tuple[str, ...]) -> None:
         if name in path:
             raise ValueError(f"modules import each other: {' → '.join([*path, name])}")
-        if name not in done:
-            source = read(f"{name}.js")
-            for what, other in IMPORT.findall(source):
-                if other.startswith(".") and not what.isidentifier():
-                    collect(_beside(name, other), (*path, name))
-            done[name] = _as_function(name, source, libraries)
+        if name in done:
+            return
+        source = read(f"{name}.js")
+
+        def unpacked(match: re.Match[str]) -> str:
+            what, other = match.groups()
+            if other not in libraries:
+                if what.isidentifier() or not other.startswith("."):
+                    return match[0]
+                other = posixpath.normpath(posixpath.join(posixpath.dirname(name), other)).removesuffix(".js")
+                collect(other, (*path, name))
+            named = {"{": what.replace(" as ", ": "), "*": what.split()[-1]}.get(what[0], f"{{ default: {what} }}")
+            return f"const {named} = {_variable(other)};"
+
+        body = IMPORT.sub(unpacked, EXPORT.sub("", source))
+        if LEFT_OVER.search(body):
+            raise _refusal(name)
+        exported = ", ".join(EXPORT.findall(source))
+        done[name] = f"const {_variable(name)} = (() => {{\n{body}return {{ {exported} }};\n}})();\n"
 
     collect(entry.removesuffix(".js"), ())
     return done
 
 
-def _as_function(name: str, source: str, libraries: Collection[str]) -> str:
-    def unpacked(match: re.Match[str]) -> str:
-        what, other = match.groups()
-        if other not in libraries and (what.isidentifier() or not other.startswith(".")):
-            return match[0]
-        named = {"{": what.replace(" as ", ": "), "*": what.split()[-1]}.get(what[0], f"{{ default: {what} }}")
-        return f"const {named} = {_variable(other if other in libraries else _beside(name, other))};"
-
-    exported = EXPORT.findall(source)
-    body = IMPORT.sub(unpacked, EXPORT.sub("", source))
-    if LEFT_OVER.search(body):
-        raise _refusal(name)
-    return f"const {_variable(name)} = (() => {{\n{body}return {{ {', '.join(exported)} }};\n}})();\n"
-
-
 def _refusal(name: str) -> ValueError:
     return ValueError(f"{name}.js cannot be put into a page: unknown import or export, or the text `</` or `<!--`")
-
-
-def _beside(name: str, other: str) -> str:
-    """What a module imports, by its path without .js."""
-    return posixpath.normpath(posixpath.join(posixpath.dirname(name), other)).removesuffix(".js")
 
 
 def _variable(name: str) -> str:

@@ -239,9 +239,8 @@ def readings(result: xr.Dataset) -> list[MeasureReading]:
     """Every measure of a result."""
     result = without_noise(result)
     units, reads = units_along(result["nominal"], "measure"), []
-    limits, bounds, *words = (
-        attribute(result, key) for key in ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
-    )
+    stated = ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
+    limits, bounds, *words = (attribute(result, key) for key in stated)
     for i, name in enumerate(names(result, "measure")):
         alone, over = result.isel(measure=i), None
         text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)

@@ -199,12 +199,26 @@ def _in_space(result: xr.Dataset) -> dict[str, Any]:
         axes = [{"link": link, "along": numbers(bodies.element(name, side)[1])} for side, link in sides]
         seats[name] = {"link": joint["links"][1], "at": numbers(bodies.seat(name)), "axes": axes,
                        "ends": _ends(result, bodies, name)}  # fmt: skip
+    loads = []  # forces at points and moments on links, with the place they are drawn at in the frame of the link
+    for name, load in bodies.stated["loads"].items():
+        link = load.get("link")
+        if link not in bodies.poses:
+            continue
+        spots = {joint: bodies.seat(joint, entry["links"].index(link)) for joint, entry in bodies.joints.items()
+                 if link in entry["links"]}  # fmt: skip
+        middle = np.mean(list(spots.values()), axis=0) if spots and load.get("at") is None else None
+        spots |= {key.split(".", 1)[1]: at for key, at in bodies.free.items() if key.split(".", 1)[0] == link}
+        at = spots.get(load.get("at") or load.get("joint") or "", middle)
+        if at is not None:
+            loads.append({"name": name, "link": link, "at": numbers(at), "force": load.get("force") or [0.0, 0.0, 0.0],
+                          "moment": load.get("moment") or [0.0, 0.0, 0.0], "frame": load.get("frame", "global"),
+                          "varies": bool(load.get("varies")), "useful": bool(load.get("useful"))})  # fmt: skip
     return parts | {
         "size": numbers(np.array([bodies.size]))[0], "scaled": bool(bodies.extent), "middle": numbers(bodies.middle),
         "view": {"around": around, "above": above, "box": numbers(np.array(picture.box))},
         "solids": [solid.data() for solid in picture.solids],
         "free": [{"key": key, "link": key.split(".", 1)[0], "at": numbers(at)} for key, at in bodies.free.items()],
-        "seats": seats, "loads": _loads_in_space(bodies), "apart": any(bodies.shifts.values()),
+        "seats": seats, "loads": loads, "apart": any(bodies.shifts.values()),
     }  # fmt: skip
 
 
@@ -223,26 +237,6 @@ def _ends(result: xr.Dataset, bodies: Space, name: str) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _loads_in_space(bodies: Space) -> list[dict[str, Any]]:
-    """Forces at their points and moments on their links, with the place they are drawn at in the link's frame."""
-    rows = []
-    for name, load in bodies.stated["loads"].items():
-        link = load.get("link")
-        if link not in bodies.poses:
-            continue
-        seats = {joint: bodies.seat(joint, entry["links"].index(link)) for joint, entry in bodies.joints.items()
-                 if link in entry["links"]}  # fmt: skip
-        spots = seats | {key.split(".", 1)[1]: at for key, at in bodies.free.items() if key.split(".", 1)[0] == link}
-        at = spots.get(load.get("at") or load.get("joint") or "")
-        if at is None and load.get("at") is None and seats:
-            at = np.mean(list(seats.values()), axis=0)
-        if at is not None:
-            rows.append({"name": name, "link": link, "at": numbers(at), "force": load.get("force") or [0.0, 0.0, 0.0],
-                         "moment": load.get("moment") or [0.0, 0.0, 0.0], "frame": load.get("frame", "global"),
-                         "varies": bool(load.get("varies")), "useful": bool(load.get("useful"))})  # fmt: skip
-    return rows
-
-
 def _screw(result: xr.Dataset, bodies: Space, link: str) -> dict[str, Any] | None:
     """The instantaneous screw axis of a link against the ground: a point, a unit direction, pitch (m/rad)."""
     spin = column(result, "link_angular_velocity", link=link)
@@ -251,9 +245,8 @@ def _screw(result: xr.Dataset, bodies: Space, link: str) -> dict[str, Any] | Non
         return None
     place, velocity = (members(result, f"point_{what}", "point")[key] for what in ("position", "velocity"))
     point, along, pitch = screw_axis(spin, place, velocity, bodies.middle)
-    return {axis: series(part) for axis, part in zip("xyzuvw", (*point, *along), strict=True)} | {
-        "pitch": series(pitch)
-    }
+    parts = zip(("x", "y", "z", "u", "v", "w", "pitch"), (*point, *along, pitch), strict=True)
+    return {name: series(part) for name, part in parts}
 
 
 def screw_axis(spin: Row, place: Row, velocity: Row, near: Row) -> tuple[Row, Row, Row]:

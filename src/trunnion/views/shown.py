@@ -43,11 +43,22 @@ def plot(of: Mechanism | xr.Dataset, kind: str | None = None, **options: Any) ->
     them); the main one if not given. options: those of the figure, as ideal= (the same run without friction) of a
     cycle. Raises MechanismError for a kind that there is not, or where there is nothing to draw.
     """
-    if not isinstance(of, Mechanism):
-        return figure_of(of, kind, **options)
-    if kind is not None or options:
-        raise MechanismError(Finding("a mechanism has one drawing", "kind", "analyse it first, and plot the result"))
-    return of.plot()
+    if isinstance(of, Mechanism):
+        if kind is not None or options:
+            remedy = "analyse it first, and plot the result"
+            raise MechanismError(Finding("a mechanism has one drawing", "kind", remedy))
+        return of.plot()
+    made = view(of, "figure").figure
+    _, *parameters = signature(made).parameters
+    if kind is not None and "kind" not in parameters:
+        raise MechanismError(Finding(f"a result of {kind_of(of)} has one figure", "kind", "leave the kind out"))
+    check_keywords(f"plot() of a {kind_of(of)}", options, parameters)
+    drawn = made(of, **(options if kind is None else {"kind": kind, **options}))
+    if not isinstance(drawn, Plot):  # a drawing of the mechanism
+        return drawn  # type: ignore[no-any-return]
+    from trunnion.views.draw import figure  # with matplotlib, which is slow to import
+
+    return figure(of, drawn)
 
 
 @strict_arguments
@@ -57,30 +68,10 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) 
     ideal: of a cycle, the same run without friction, drawn beside; options: others of its report. Raises MechanismError
     of a result that has no report, ValueError if `ideal` has other positions.
     """
-    return report_of(result, **(options if ideal is None else {"ideal": ideal, **options}))
-
-
-def report_of(result: xr.Dataset, **options: Any) -> str:
-    """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
+    options |= {} if ideal is None else {"ideal": ideal}
     made = view(result, "report").report
     check_keywords(f"report() of a {kind_of(result)}", options, [*signature(made).parameters][1:])
     return str(made(result, **options))
-
-
-def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
-    """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
-    made = view(result, "figure").figure
-    _, *parameters = signature(made).parameters
-    if kind is not None and "kind" not in parameters:
-        what, remedy = f"a result of {kind_of(result)} has one figure", "leave the kind out"
-        raise MechanismError(Finding(what, "kind", remedy))
-    check_keywords(f"plot() of a {kind_of(result)}", options, parameters)
-    drawn = made(result, **(options if kind is None else {"kind": kind, **options}))
-    if not isinstance(drawn, Plot):  # a drawing of the mechanism
-        return drawn  # type: ignore[no-any-return]
-    from trunnion.views.draw import figure  # with matplotlib, which is slow to import
-
-    return figure(result, drawn)
 
 
 def check_kind(of: str, kind: str) -> None:
@@ -173,9 +164,8 @@ def _html(name: str, facts: Sequence[str], body: str, findings: Sequence[Finding
         where = f"{finding.kind_of_part} " if finding.kind_of_part else where
         remedy = f" — {with_code(finding.remedy)}" if finding.remedy else ""
         colour = COLOURS.get(str(finding.severity), "inherit")
-        rows.append(
-            f'<li><b style="color:{colour}">{finding.severity}</b> {where}{with_code(finding.what)}{remedy}</li>'
-        )
+        what = f'<b style="color:{colour}">{finding.severity}</b> {where}{with_code(finding.what)}{remedy}'
+        rows.append(f"<li>{what}</li>")
     listed = f'<ul style="margin:4px 0 0;padding-left:1.2em">{"".join(rows)}</ul>' if rows else ""
     lines, more = "".join(f"<div>{fact}</div>" for fact in facts), len(findings) - MOST_FINDINGS
     listed += f"<p>… and {more} more findings</p>" if more > 0 else ""

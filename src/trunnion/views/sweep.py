@@ -172,9 +172,8 @@ def arrange(result: xr.Dataset, x: str = "", family: str = "") -> Arrangement:
     for name in attribute(result, "swept"):
         about = result[name].attrs
         unit = str(about["written_unit"] or about["units"])
-        every[name] = Scale(
-            name, "" if unit == "1" else unit, result[name].values / float(about["written_factor"]) + 0.0
-        )
+        values = result[name].values / float(about["written_factor"]) + 0.0
+        every[name] = Scale(name, "" if unit == "1" else unit, values)
     first, second = check_axes({name: len(scale.values) for name, scale in every.items()}, x, family)
     rest = [scale for name, scale in every.items() if name not in (first, second)]
     facets, fixed = (tuple(s for s in rest if (len(s.values) > 1) is varies) for varies in (True, False))
@@ -259,10 +258,8 @@ def tables(result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str
                      *(_number(values[cell][i, k], name) or CAUSES.get(int(status[cell][i, k]), "") for k in across)]
                     for i in down]  # fmt: skip
             title = plan.title(f"{name} over {plan.x.name} and, in columns, {plan.other.name},", place).rstrip(",")
-            shown = len(down) * len(across)
-            every.append(
-                Table(title, [plan.x.title, *(plan.other.say(k) for k in across)], rows, values[cell].size - shown)
-            )
+            head, left_out = [plan.x.title, *map(plan.other.say, across)], values[cell].size - len(down) * len(across)
+            every.append(Table(title, head, rows, left_out))
         hidden = (len(plan.places) - len(picked)) * len(plan.x.values) * len(plan.other.values)
         every[-1] = replace(every[-1], left_out=every[-1].left_out + hidden)
     return every

@@ -14,7 +14,7 @@ from manual.conftest import Run
 from manual.test_cli import EXAMPLES, FOUR_BAR, files
 from manual.test_cli import table as rows
 from played import four_bar
-from trunnion.views.shown import figure_of as figure
+from trunnion.views.shown import plot as figure
 
 
 @pytest.mark.slow

@@ -2,8 +2,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { extent, projection } from "../../src/trunnion/views/web/projection.js";
-import { keyed, looking, shifted, turned, zoomed } from "../../src/trunnion/views/web/camera.js";
+import { extent, keyed, looking, projection, shifted, turned, zoomed } from "../../src/trunnion/views/web/camera.js";
 import { meshes, seen, shades, stroke } from "../../src/trunnion/views/web/solids.js";
 import { apply, cross, dot, plus, product, rotation } from "../../src/trunnion/views/web/vector.js";
 

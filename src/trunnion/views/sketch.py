@@ -22,8 +22,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import GUIDED, PAIRS
+from trunnion.results.dataset import without_noise
 from trunnion.results.quantities import prefixed
-from trunnion.results.scales import without_noise
 from trunnion.views.axis import Array, Drawn, abscissa, is_spatial, layout, members, status_text
 from trunnion.views.bodies import HALF, Scenery, Solid, Space, scenery, space
 from trunnion.views.curves import ease, usual_peak

@@ -94,16 +94,15 @@ assert.deepEqual(forceAt(lever, sliding, 0).map((part) => Number(part.toFixed(12
 assert.equal(forceAt(lever, sliding, 1), null);
 
 // ---- the locking margin in words
-const { at: here, told } = await load("studio/words.js");
-assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 0), "4 here, least 0.5 at 90°");
-assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 1), "none here, least 0.5 at 90°");
-assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 2), "0.5 here: it locks, least 0.5 at 90°");
-assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 3), "> 10 here, least 0.5 at 90°");
-assert.equal(told([10], { value: 10, beyond: true, at: "0°" }, 7), "> 10 everywhere");
-assert.equal(told(null, null, 0), "—");
-assert.equal(here({ value: 3, beyond: true }), "> 3 here");
-assert.equal(here({ value: 0.8, beyond: false }), "0.8 here: it locks");
-assert.equal(here({ value: null, beyond: false }), "none here");
+assert.equal(fields.told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 0), "4 here, least 0.5 at 90°");
+assert.equal(fields.told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 1), "none here, least 0.5 at 90°");
+assert.equal(fields.told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 2), "0.5 here: it locks, least 0.5 at 90°");
+assert.equal(fields.told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 3), "> 10 here, least 0.5 at 90°");
+assert.equal(fields.told([10], { value: 10, beyond: true, at: "0°" }, 7), "> 10 everywhere");
+assert.equal(fields.told(null, null, 0), "—");
+assert.equal(fields.at({ value: 3, beyond: true }), "> 3 here");
+assert.equal(fields.at({ value: 0.8, beyond: false }), "0.8 here: it locks");
+assert.equal(fields.at({ value: null, beyond: false }), "none here");
 
 // ---- answers
 const header = JSON.stringify({ ask: "model", points: { A: { x: { column: [1, 2] } } }, list: [1, null] });

@@ -6,7 +6,7 @@ import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
-import { Findings, jump } from "./findings.js";
+import { Findings, jump, Text } from "./findings.js";
 import { GroupBar } from "./group.js";
 import { ContextMenu } from "./menu.js";
 import { Motion } from "./motion.js";
@@ -18,7 +18,6 @@ import { Space } from "./space.js";
 import { Stage } from "./stage.js";
 import { Guide, Welcome, step as taught } from "./start.js";
 import * as state from "./state.js";
-import { Text } from "./text.js";
 import { pointer } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 

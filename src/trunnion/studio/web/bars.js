@@ -1,15 +1,15 @@
 // The bars around the sheet: file, undo, friction and export above; tools at the left; readiness and margin below.
 
 import { exported, openText, redo, save, undo } from "./actions.js";
+import { at, told } from "./fields.js";
 import { LAYERS } from "./layers.js";
-import { Margin } from "./margin.js";
 import { sheet } from "./sheet.js";
 import { begin, nextTool } from "./start.js";
 import * as state from "./state.js";
-import { STUDY_OF, openStudy } from "./studies.js";
+import { openStudy, STUDY_OF } from "./studies.js";
 import { nextTheme, theme } from "./theme.js";
-import { TOOLS, choose, hint } from "./tools.js";
-import { Button, Icon, Menu, html } from "./ui.js";
+import { choose, hint, TOOLS } from "./tools.js";
+import { Button, html, Icon, Menu } from "./ui.js";
 
 const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["report", "Report (HTML)"]]; // prettier-ignore
 
@@ -91,4 +91,19 @@ export function BottomBar() {
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore
+}
+
+// ---- the locking margin, always in view ----------------------------------------------------------------------------
+
+const FEW = 2; // so many times the friction are near
+const MEANING = "So many times the friction may grow before the position locks; at 1 and below it locks.";
+
+function Margin() {
+  const { margin, margin_least: least, margin_why: why } = state.answer.value ?? {};
+  const live = state.live.value?.margin; // while the mechanism is being changed
+  const words = !state.solved.value ? "—" : (why ?? (live ? at(live) : told(margin, least, state.index.value)));
+  const low = why ? null : (live ?? least);
+  const near = low && low.value !== null && !low.beyond && low.value < FEW;
+  return html`<span class=${near ? "margin near" : "margin"} title=${MEANING} aria-label=${`Locking margin: ${words}`} role="group">
+    <b>Locking margin</b> ${words}</span>`;
 }

@@ -4,7 +4,7 @@ import { render } from "preact";
 import { start } from "./actions.js";
 import { App, keepAwaited } from "./app.js";
 import { keepBlocks } from "./blocks.js";
-import { keepCurves } from "./curves.js";
+import { keepCurves } from "./plots.js";
 import { listenToFailures } from "./boundary.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";

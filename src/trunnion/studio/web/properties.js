@@ -1,17 +1,17 @@
 // Values of what is chosen, as the file writes them, typed in place; the list of parts; dimensions with sliders.
 
 import { useRef, useState } from "preact/hooks";
+import { arrow } from "../web/arrow.js";
+import { at, full, peak } from "../web/data.js";
+import { quantity, short } from "../web/format.js";
 import { changed, edit, newest, setValue } from "./actions.js";
-import { AddDimension } from "./adding.js";
 import { ambiguous, bare, findingsOf, numberOf, partOfList, rowsOf, unitOf, usualUnit, written } from "./fields.js";
 import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import { BarMass, Gravity, Masses } from "./masses.js";
 import * as state from "./state.js";
-import { LoopTable } from "./looptable.js";
-import { Sections } from "./section.js";
 import { removePart } from "./tools.js";
-import { Button, html } from "./ui.js";
+import { Button, focusOn, html } from "./ui.js";
 
 const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Driver", loads: "Load", springs: "Spring", gears: "Gear pair" };
 const SECTIONS = ["links", "joints", "drivers", "loads", "springs", "gears"];
@@ -199,4 +199,143 @@ function Dimension({ name, value, findings }) {
     ${slides && html`<input type="range" aria-label=${`${name}, slider`} min=${Math.min(0, 2 * start.value)} max=${Math.max(0, 2 * start.value)}
       step=${Math.abs(start.value) / 200} value=${numberOf(pulled?.text ?? value)?.value} onInput=${pull} onChange=${release} onPointerUp=${back} />`}
   </div>`; // prettier-ignore
+}
+
+// ---- a dimension more ----------------------------------------------------------------------------------------------
+
+const NAME = /^[^\W\d]\w*$/u;
+
+/** Fields for a dimension that there is not yet; a definition typed for a number elsewhere makes one too. */
+function AddDimension() {
+  const add = async (event) => {
+    event.preventDefault();
+    const form = event.currentTarget;
+    const [name, value] = ["name", "value"].map((key) => form.elements[key].value.trim());
+    const { entries } = state.answer.value ?? {};
+    const why = refused(name, value, dictionary(entries?.dimensions));
+    if (why) return state.say(why, true);
+    if (await setValue(["dimensions", name], written(value, usualUnit(entries)))) {
+      form.reset();
+      focusOn(".new-dimension input");
+    }
+  };
+  return html`<form class="new-dimension" aria-label="New dimension" onSubmit=${add}>
+    <input name="name" aria-label="Name of the new dimension" placeholder="name" spellcheck=${false} />
+    <input name="value" aria-label="Value of the new dimension" placeholder="e.g. 30 mm" spellcheck=${false} />
+    <button type="submit" class="plain" title="Then type its name where a number stands; crank = 30 mm typed there makes one, too">Add dimension</button>
+  </form>`; // prettier-ignore
+}
+
+function refused(name, value, known) {
+  if (!NAME.test(name)) return `“${name}” is no name: letters, digits and _, a letter first.`;
+  if (name in known) return `There is a dimension ${name} already.`;
+  return value ? "" : `What is ${name}? Write its value, such as 30 mm.`;
+}
+
+// ---- the table of a loop -------------------------------------------------------------------------------------------
+
+/** What a loop in space begins with: four joints, the two shafts at 30°. */
+export const LOOP = `trunnion: 1
+name: Loop in space
+space: spatial
+
+loop:                                # a joint, then the link after it: its twist and distance lead to the next axis
+  - {joint: A, type: revolute, link: link1, twist: 90 deg, distance: 0 mm}
+  - {joint: B, type: cylindrical, link: link2, twist: 90 deg, distance: 0 mm}
+  - {joint: C, type: cylindrical, link: link3, twist: 90 deg, distance: 0 mm}
+  - {joint: D, type: cylindrical, link: ground, twist: 150 deg, distance: 0 mm}
+
+drivers:
+  A: {speed: 60 rpm}
+`;
+
+const TYPES = ["revolute", "cylindrical", "prismatic", "helical"];
+/** Along and about the joint's axis, then along and about the common normal to the next: key of the file, label, unit. */
+const CELLS = [["rotation", "angle θ", "deg"], ["slide", "offset s", ""], ["distance", "length a", ""], ["twist", "twist α", "deg"]]; // prettier-ignore
+/** What a joint of a type does itself: that is no number of the table. */
+const MOVES = { revolute: ["rotation"], prismatic: ["slide"], cylindrical: ["rotation", "slide"], helical: ["rotation", "slide"] };
+
+function LoopTable({ entries, findings }) {
+  const rows = entries?.loop;
+  if (!Array.isArray(rows)) return null;
+  return html`<section class="loop"><h2>Table of the loop</h2>
+    <p class="calm">A joint turns and slides about its axis by θ and s; the link after it leads over the common normal, by a and α, to the axis of the next.</p>
+    <table><thead><tr><th scope="col">joint, link</th>${CELLS.map(([, label]) => html`<th scope="col">${label}</th>`)}</tr></thead>
+      <tbody>${rows.map((row, at) => html`<${LoopRow} key=${at} row=${row ?? {}} at=${at} findings=${findings} entries=${entries} last=${rows.length < 3} />`)}</tbody></table>
+    ${findingsOf(findings, ["loop"]).filter(({ severity }) => severity === "error").map(({ what, remedy }) => html`<p class="wrong">${what}${remedy ? ` — ${remedy}` : ""}</p>`)}
+    <p class="row-of-buttons"><${Button} label="Add a joint" title="A joint and a link before the ground" onClick=${() => edit([{ do: "add-row" }])} /></p></section>`; // prettier-ignore
+}
+
+function LoopRow({ row, at, findings, entries, last }) {
+  const type = ({ target }) => edit([{ do: "set", path: ["loop", at, "type"], value: target.value }, ...(MOVES[target.value] ?? []).map((key) => ({ do: "set", path: ["loop", at, key], value: null }))]); // prettier-ignore
+  const rename = (key) => async ({ target }) => {
+    if (!(await edit([{ do: "rename", what: [`${key}s`, row[key]], to: target.value }]))) target.value = row[key];
+  };
+  const names = html`<td><span class="of-row">
+    ${["joint", "link"].map((key) => html`<input aria-label=${`${key} of row ${at + 1}`} value=${row[key] ?? ""} onChange=${rename(key)} spellcheck=${false} />`)}
+    <select aria-label=${`type of ${row.joint}`} value=${row.type} onChange=${type}>${[...new Set([...TYPES, row.type])].map((one) => html`<option value=${one}>${one}</option>`)}</select>
+    <span class="row-of-buttons"><button type="button" class="link" onClick=${() => (state.selection.value = { kind: "joints", name: row.joint })}>choose</button>
+    ${!last && html`<button type="button" class="link" aria-label=${`Delete row ${row.joint}`} onClick=${() => removePart({ kind: "joints", name: row.joint })}>delete</button>`}</span></span></td>`; // prettier-ignore
+  return html`<tr>${names}${CELLS.map(([key, label, angle]) => html`<td><${Cell} row=${row} at=${at} name=${key} label=${label} unit=${angle || usualUnit(entries)} findings=${findings} /></td>`)}</tr>`;
+}
+
+function Cell({ row, at, name, label, unit, findings }) {
+  if (MOVES[row.type]?.includes(name)) return html`<span class="calm" title="The joint itself moves so">moves</span>`;
+  const value = row[name] === undefined || row[name] === null ? "" : String(row[name]);
+  const wrong = findingsOf(findings, ["loop", row.joint, name]).filter(({ severity }) => severity !== "note");
+  const take = async ({ target }) => {
+    const own = ambiguous(target.value) ? null : written(target.value, unitOfCell(value, unit));
+    if (own === null && target.value.trim()) state.say(`“${target.value}” may be a thousand or a decimal.`, true);
+    else if (await setValue(["loop", at, name], own)) return;
+    target.value = value;
+  };
+  return html`<input aria-label=${`${label} of ${row.joint}`} value=${value} placeholder="0" aria-invalid=${wrong.length > 0} title=${wrong.map(({ what }) => what).join("; ") || `A number alone is in ${unitOfCell(value, unit)}`} onChange=${take} spellcheck=${false} />`; // prettier-ignore
+}
+
+/** The unit that a number alone takes: that of what was there, or the usual one. */
+const unitOfCell = (value, usual) => (bare(value) ? "" : numberOf(value)?.rest.split("±")[0].trim()) || usual;
+
+// ---- sections through pins -----------------------------------------------------------------------------------------
+
+const [WIDE, TALL] = [330, 156]; // px of a section
+const [HALF, PLAY, PIN, WALL] = [112, 17, 24, 9]; // px: half the length, the play to either side, half the pin, the wall
+const ARROW = 30; // px, of the largest load
+
+/** The sections of a joint with a pin that has two ends in a hole, in z–x and in z–y of the hole; nothing for others. */
+function Sections({ joint }) {
+  const scene = state.solved.value ? state.answer.value.scene : null;
+  const seat = scene?.space === "spatial" && scene.built?.seats.find((one) => one.joint === joint);
+  if (!seat || seat.ends.length !== 2 || !seat.length) return null;
+  const index = state.index.value;
+  const most = peak(...seat.ends.flatMap(({ force }) => ["x", "y"].map((axis) => full(force[axis], scene.count))));
+  const times = Number(((PLAY / seat.clearance) * (seat.length / (2 * HALF))).toPrecision(3));
+  return html`<h3>Section through the pin</h3>
+    ${["x", "y"].map((axis) => html`<${Section} key=${axis} seat=${seat} axis=${axis} index=${index} most=${most} />`)}
+    <p class="calm">Pin of ${short(seat.links[0])} in ${short(seat.links[1])}, ${quantity(seat.length, "m")} long, play ${quantity(seat.clearance, "m")} to either side: drawn ${times} times larger across than along.
+      Dashed: how far its axis may go. Arrows: load on the hole at each end, the longest ${quantity(most, "N")}.</p>`; // prettier-ignore
+}
+
+function Section({ seat, axis, index, most }) {
+  const ends = seat.ends.map(({ offset, force }) => ({ off: at(offset[axis], index), load: at(force[axis], index) }));
+  const [x, y] = [WIDE / 2 + 8, TALL / 2];
+  const known = ends.every(({ off }) => off !== null);
+  const places = ends.map(({ off }, end) => [x + (end ? HALF : -HALF), y - ((off ?? 0) / seat.clearance) * PLAY]);
+  const [[ax, ay], [bx, by]] = places;
+  const more = 14 * ((by - ay) / (2 * HALF)); // it stands out at both ends
+  const body = (half) => `M${ax - 14},${ay - more + half}L${bx + 14},${by + more + half}`;
+  const middle = known ? (ends[0].off + ends[1].off) / 2 : null;
+  const tilt = known ? (ends[1].off - ends[0].off) / seat.length : null;
+  const told = known ? `offset ${quantity(middle, "m", seat.clearance)}, tilt ${quantity(1e3 * tilt, "mrad", (2e3 * seat.clearance) / seat.length)}` : "no answer";
+  const loads = places.map(([px, py], end) => {
+    const load = ((ends[end].load ?? 0) / (most || 1)) * ARROW;
+    return load ? arrow(px, py - Math.sign(load) * PIN, 0, -load) : "";
+  });
+  const wall = (sign) => html`<rect class="wall" x=${x - HALF} y=${y + (sign > 0 ? PIN + PLAY : -PIN - PLAY - WALL)} width=${2 * HALF} height=${WALL} />`;
+  return html`<svg class="pin-section" viewBox=${`0 0 ${WIDE} ${TALL}`} role="img" aria-label=${`Section of ${seat.joint} in z and ${axis}: ${told}`}>
+    ${[1, -1].map(wall)}
+    ${[1, -1].map((sign) => html`<path class="reach" d=${`M${x - HALF},${y - sign * PLAY}h${2 * HALF}`} />`)}
+    ${known && html`<path class="pin-body k0" d=${`${body(-PIN)}${body(PIN).replace(/M(\S+)L(\S+)/, "L$2L$1")}Z`} /><path class="axis-of-pin" d=${body(0)} />`}
+    ${known && html`<path class="reaction k1" d=${loads.join("")} />`}
+    <text x="2" y="13">${axis}</text><text x=${WIDE - 12} y=${TALL - 6}>z</text><text x="20" y="13">${told}</text>
+  </svg>`; // prettier-ignore
 }

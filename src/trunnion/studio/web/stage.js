@@ -2,21 +2,23 @@
 
 import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
-import { build, drawTracks, drawing, pose } from "./drawing.js";
+import { stated } from "../web/format.js";
+import { build, drawing, drawTracks, pose, TARGET } from "./drawing.js";
+import { gridStep } from "./geometry.js";
 import { others, poseGhosts } from "./ghosts.js";
-import { laid } from "./layers.js";
-import { addOverlay, poseOverlay } from "./overlay.js";
-import { compared } from "./variants.js";
 import { boxTo, groupMarks } from "./group.js";
-import { massSpots, poseMasses } from "./masses.js";
-import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
+import { laid } from "./layers.js";
+import { massSpots, poseMasses } from "./masses.js";
+import { addOverlay, poseOverlay } from "./overlay.js";
 import { drawn, kindsOf, sheet, shown } from "./sheet.js";
 import { rings } from "./start.js";
 import * as state from "./state.js";
 import { pointer, toolOf, typed, typedEnd } from "./tools.js";
 import { html } from "./ui.js";
+import { compared } from "./variants.js";
 
 export function Stage() {
   const holder = useRef(null);
@@ -143,4 +145,65 @@ function rubber(frame, from, to) {
   const line = svg("line", { class: "rubber" });
   set(line, { x1, y1, x2, y2 });
   return [line, label];
+}
+
+// ---- handles -------------------------------------------------------------------------------------------------------
+
+const NOUNS = { joints: "Joint", points: "Point", centres: "Mass centre of" };
+const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
+const FEW = 60; // that are put at every picture; to move more takes longer than a picture has, and they follow
+const REST = 150; // ms after which they do
+
+/** Put targets over the spots; `chosen` {kind, name} is marked. */
+function poseHandles(view, spots, chosen) {
+  const few = spots.slice(0, MOST);
+  const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
+  const fresh = view.handled !== names;
+  if (fresh) buildHandles(view, few, names);
+  view.target = targets(view, few, chosen);
+  if (fresh || few.length <= FEW) return view.target();
+  if (chosen) view.target(chosen);
+  view.waits ??= setTimeout(() => ((view.waits = null), view.target()), REST);
+}
+
+/** A function that puts the targets, or that of the chosen spot alone, over their spots. */
+function targets({ layers, frame, scene, drawn }, few, chosen) {
+  const least = gridStep(frame.scale) / 1000; // what a hand can tell apart: less is rounding
+  const coordinate = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
+  const same = (one, other) => one.kind === other?.kind && one.name === other.name;
+  return (only = null) => {
+    const joints = only ? [] : few.filter(({ kind }) => kind !== "centres").map((one) => frame.to(one.at));
+    few.forEach((one, order) => {
+      if (only && !same(one, only)) return;
+      const { kind, name, key, at, mass } = one;
+      const [x, y] = frame.to((key && place(scene, key, drawn)) ?? at); // errors may be drawn larger
+      const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
+      set(layers.handles.children[order], {
+        cx: x.toFixed(1),
+        cy: y.toFixed(1),
+        "aria-label": words,
+        class: same(one, chosen) ? "handle chosen" : mass && joints.some((spot) => Math.hypot(spot[0] - x, spot[1] - y) < TARGET) ? "handle under" : "handle",
+      });
+    });
+  };
+}
+
+function buildHandles(view, spots, names) {
+  const { handles } = view.layers;
+  const active = document.activeElement;
+  const held = active instanceof SVGElement && handles.contains(active) ? active.dataset : null;
+  view.handled = names;
+  handles.replaceChildren(
+    ...spots.map(({ kind, name, key }) =>
+      svg("circle", { r: TARGET, tabindex: 0, role: "button", "data-kind": kind, "data-name": name, "data-key": key }),
+    ),
+  );
+  if (held) [...handles.children].find((one) => one.dataset.kind === held.kind && one.dataset.name === held.name)?.focus();
+}
+
+/** Mark the chosen link, load or spring. */
+function markChosen(view, chosen) {
+  for (const node of view.root.querySelectorAll("g[data-kind]")) {
+    node.classList.toggle("chosen", node.dataset.kind === chosen?.kind && node.dataset.name === chosen.name);
+  }
 }

@@ -7,7 +7,7 @@ import { svg } from "../web/dom.js";
 import { openExample, openText, takeText } from "./actions.js";
 import { Picture } from "./gallery.js";
 import { dictionary, groundOf } from "./geometry.js";
-import { LOOP } from "./looptable.js";
+import { LOOP } from "./properties.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { choose } from "./tools.js";

@@ -1,7 +1,7 @@
 // A line chart over the drive: axes, curves with gaps, shaded positions without an answer, a cursor that follows.
 
 import { domain, extent, gaps, lost, nearest, outside, peak, usualPeak } from "./data.js";
-import { clipped, html, onWidth, set, svg } from "./dom.js";
+import { clipped, figure, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
 const MOST_LINES = 24; // events of a motion that are drawn over the whole height
@@ -25,19 +25,8 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   const remark = [cut ? `The peak of ${quantity(peak(...columns), unit, undefined, scene.units)} ${outside(scene)}` : "", note].filter(Boolean).join(" ");
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
-  const element = html(
-    "figure",
-    { class: "chart" },
-    html(
-      "figcaption",
-      {},
-      html("span", { class: "title" }, title),
-      html("span", { class: "unit" }, scale.unit && `[${scale.unit}]`),
-    ),
-    legend(series, values, band),
-    plot,
-    remark ? html("p", { class: "remark" }, remark) : null,
-  );
+  const notes = remark ? html("p", { class: "remark" }, remark) : null;
+  const element = figure("chart", title, scale.unit, null, legend(series, values, band), plot, notes);
   const chart = {
     scene,
     scale,
@@ -96,9 +85,10 @@ function draw(chart, width) {
   const frame = {
     width,
     height,
+    left: MARGIN.left,
+    right,
     top,
     bottom,
-    right,
     x,
     y: (value) => bottom - ((value - y0) / (y1 - y0)) * (bottom - top),
     back: (px) => x0 + ((px - MARGIN.left) / (right - MARGIN.left)) * (x1 - x0),
@@ -106,12 +96,7 @@ function draw(chart, width) {
   chart.frame = frame;
   chart.cursor = svg("line", { class: "cursor", y1: top, y2: bottom });
   chart.dots = series.map((one) => svg("circle", { class: `dot ${one.kind}`, r: one.quiet ? 0 : 3.2 }));
-  const box = {
-    x: MARGIN.left - 2,
-    y: top - 2,
-    width: right - MARGIN.left + 4,
-    height: bottom - top + 4,
-  };
+  const box = { x: MARGIN.left - 2, y: top - 2, width: right - MARGIN.left + 4, height: bottom - top + 4 };
   const curves = series.map((one) =>
     svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor, one.breaks) }),
   );
@@ -210,39 +195,21 @@ function describe(chart) {
 function axes(abscissa, frame, [x0, x1], [y0, y1]) {
   const single = abscissa.values.length === 1;
   const across = single ? abscissa.values : ticks(x0, x1, frame.width < 420 ? 5 : 9, abscissa.unit === "°");
-  const up = ticks(y0, y1, 6);
-  const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
-  const parts = up.map((value) =>
-    svg("line", {
-      class: value === 0 ? "zero" : "grid",
-      x1: MARGIN.left,
-      x2: frame.right,
-      y1: frame.y(value),
-      y2: frame.y(value),
-    }),
-  );
-  parts.push(
-    ...across.map((value) =>
-      svg("line", { class: "grid", x1: frame.x(value), x2: frame.x(value), y1: frame.top, y2: frame.bottom }),
-    ),
-  );
-  parts.push(
-    ...up.map((value) =>
-      svg(
-        "text",
-        { class: "tick end", x: MARGIN.left - 8, y: frame.y(value), dy: "0.32em" },
-        tickLabel(value, step(up)),
-      ),
-    ),
-  );
-  parts.push(
-    ...across.map((value) =>
-      svg("text", { class: "tick middle", x: frame.x(value), y: frame.bottom + 16 }, tickLabel(value, step(across))),
-    ),
-  );
   const label = abscissa.unit ? `${abscissa.label} [${abscissa.unit}]` : abscissa.label;
-  parts.push(svg("text", { class: "axis middle", x: (MARGIN.left + frame.right) / 2, y: frame.bottom + 34 }, label));
-  return parts;
+  const middle = (frame.left + frame.right) / 2;
+  return [...grid(frame, across, ticks(y0, y1, 6)), svg("text", { class: "axis middle", x: middle, y: frame.bottom + 34 }, label)];
+}
+
+/** Lines and numbers of both axes of a frame {left, right, top, bottom, x, y}; crossed: x = 0 is marked as y = 0 is. */
+export function grid({ left, right, top, bottom, x, y }, across, up, crossed = false) {
+  const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
+  const line = (zero, ends) => svg("line", { class: zero ? "zero" : "grid", ...ends });
+  return [
+    ...up.map((value) => line(value === 0, { x1: left, x2: right, y1: y(value), y2: y(value) })),
+    ...across.map((value) => line(crossed && value === 0, { x1: x(value), x2: x(value), y1: top, y2: bottom })),
+    ...up.map((value) => svg("text", { class: "tick end", x: left - 8, y: y(value), dy: "0.32em" }, tickLabel(value, step(up)))),
+    ...across.map((value) => svg("text", { class: "tick middle", x: x(value), y: bottom + 16 }, tickLabel(value, step(across)))),
+  ];
 }
 
 function shading(chart, frame) {

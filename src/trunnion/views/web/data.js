@@ -58,7 +58,7 @@ export function peak(...list) {
 /**
  * The magnitude a view should show: the greatest, unless it is next to a dead centre and towers over all others.
  * Beside it `ease` of the scene is below 1; what grows otherwise than forces do there is a load at work, and all is
- * shown. The rule is that of trunnion/views/peaks.py.
+ * shown. The rule is that of trunnion/views/curves.py.
  */
 export function usualPeak({ ease = [] }, ...list) {
   let [most, rest, works] = [0, 0, 0];

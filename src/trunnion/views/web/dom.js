@@ -29,6 +29,12 @@ function fill(element, attributes, children) {
   return element;
 }
 
+/** A figure: its title, unit and, if it has one, running value over its parts. */
+export function figure(kind, title, unit, value, ...parts) {
+  const words = [html("span", { class: "title" }, title), html("span", { class: "unit" }, unit && `[${unit}]`), value];
+  return html("figure", { class: kind }, html("figcaption", {}, ...words), ...parts);
+}
+
 let clips = 0; // clip paths need names that are unique in the page
 
 /** Children of a drawing, cut at the box {x, y, width, height}. */

@@ -1,5 +1,5 @@
 // Numbers as an engineer reads them: an SI prefix that fits, sensible digits, true minus signs.
-// The same rules as trunnion/views/quantities.py; tests/views holds both to one table of cases.
+// The same rules as trunnion/results/quantities.py; tests/views holds both to one table of cases.
 
 const PREFIXES = { "-4": "p", "-3": "n", "-2": "µ", "-1": "m", 0: "", 1: "k", 2: "M", 3: "G" };
 const [SMALLEST, LARGEST] = [0.01, 1e4]; // of a figure in the unit of its page; others have their own

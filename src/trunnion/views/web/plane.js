@@ -6,7 +6,6 @@ import { at, forceAt, guide, hull, peak, place, quantile, usualPeak } from "./da
 import { set, svg } from "./dom.js";
 import { short } from "./format.js";
 import { loadsOf, poseLoad } from "./load.js";
-import { coil } from "./spring.js";
 
 const BEYOND = 26; // px that a guide is longer than the travel of its block's middle, at each end
 const PISTON = 0.95; // length of a cylinder's rod, of the least distance of its eyes
@@ -408,4 +407,25 @@ function boxOf([x, y], [dx, dy], wide) {
 
 function meet(one, other) {
   return one.left < other.right && one.right > other.left && one.top < other.bottom && one.bottom > other.top;
+}
+
+// ---- springs -------------------------------------------------------------------------------------------------------
+
+const TURNS = 8;
+const WIDTH = 7; // px, to each side
+const END = 0.18; // share of the length that is straight at each end
+
+/** The path between two places; none if an end has no place. */
+function coil(ends) {
+  if (ends.length < 2) return "";
+  const [[x1, y1], [x2, y2]] = ends;
+  const length = Math.hypot(x2 - x1, y2 - y1) || 1;
+  const across = [(-(y2 - y1) * WIDTH) / length, ((x2 - x1) * WIDTH) / length];
+  const corners = [[END, 0]];
+  for (let turn = 0; turn < 2 * TURNS; turn += 1)
+    corners.push([END + ((1 - 2 * END) * (turn + 0.5)) / (2 * TURNS), turn % 2 ? -1 : 1]);
+  corners.push([1 - END, 0], [1, 0]);
+  const spot = ([along, side]) =>
+    `${(x1 + along * (x2 - x1) + side * across[0]).toFixed(1)},${(y1 + along * (y2 - y1) + side * across[1]).toFixed(1)}`;
+  return `M${x1.toFixed(1)},${y1.toFixed(1)}L${corners.map(spot).join("L")}`;
 }

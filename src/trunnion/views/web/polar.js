@@ -1,8 +1,9 @@
 // Polar reaction diagram of one joint: the tip of the force vector over the run, in the global frame.
 
+import { grid } from "./chart.js";
 import { at, extent, magnitude, outside, peak, usualPeak } from "./data.js";
-import { clipped, html, onWidth, set, svg } from "./dom.js";
-import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
+import { clipped, figure, html, onWidth, set, svg } from "./dom.js";
+import { fixed, prefixed, quantity, ticks } from "./format.js";
 
 const MARGIN = { top: 10, right: 14, bottom: 42, left: 60 };
 const NEAR = 18; // px: a pointer without a button as near to the curve points at it
@@ -22,19 +23,9 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, /** @ty
   const scale = prefixed(most, "N", scene.units);
   const plot = html("div", { class: "plot" });
   const value = html("span", { class: "value" }, "—");
-  const element = html(
-    "figure",
-    { class: "chart polar" },
-    html(
-      "figcaption",
-      {},
-      html("span", { class: "title" }, joint.name),
-      html("span", { class: "unit" }, `[${scale.unit}]`),
-      value,
-    ),
-    plot,
-    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N", undefined, scene.units)} ${outside(scene)}`),
-  );
+  const remark = `The peak of ${quantity(highest, "N", undefined, scene.units)} ${outside(scene)}`;
+  const notes = cut === null ? null : html("p", { class: "remark" }, remark);
+  const element = figure("chart polar", joint.name, scale.unit, value, plot, notes);
   const chart = { scene, joint, kind, scale, cut, plot, axes: [across, up], frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);
   const point = (event, firm) => {
@@ -62,6 +53,10 @@ function draw(chart, width) {
   const frame = {
     width,
     side,
+    left: MARGIN.left,
+    right: MARGIN.left + side,
+    top: MARGIN.top,
+    bottom: MARGIN.top + side,
     x: (value) => MARGIN.left + ((value - middle[0]) / half + 1) * (side / 2),
     y: (value) => MARGIN.top + (1 - (value - middle[1]) / half) * (side / 2),
   };
@@ -78,7 +73,7 @@ function draw(chart, width) {
         role: "img",
         "aria-label": `Polar diagram of the reaction in joint ${joint.name}`,
       },
-      ...grid(frame, across, up, side),
+      ...grid(frame, across, up, true),
       svg("text", { class: "axis middle", x: MARGIN.left + side / 2, y: height - 5 }, `F${chart.axes[0]}`),
       svg("text", { class: "axis", x: 0, y: MARGIN.top + side / 2, dy: "0.32em" }, `F${chart.axes[1]}`),
       clipped(
@@ -103,41 +98,6 @@ function around({ joint, cut, scale: { factor } }) {
   const [y0, y1] = extent([[0], ...both.map((one) => one.y)]);
   const half = (Math.max(x1 - x0, y1 - y0) / 2) * factor * 1.14 || 1;
   return { middle: [((x0 + x1) / 2) * factor, ((y0 + y1) / 2) * factor], half };
-}
-
-function grid(frame, across, up, side) {
-  const step = (list) => (list.length > 1 ? list[1] - list[0] : 1);
-  const bottom = MARGIN.top + side;
-  return [
-    ...across.map((value) =>
-      svg("line", {
-        class: value === 0 ? "zero" : "grid",
-        x1: frame.x(value),
-        x2: frame.x(value),
-        y1: MARGIN.top,
-        y2: bottom,
-      }),
-    ),
-    ...up.map((value) =>
-      svg("line", {
-        class: value === 0 ? "zero" : "grid",
-        x1: MARGIN.left,
-        x2: MARGIN.left + side,
-        y1: frame.y(value),
-        y2: frame.y(value),
-      }),
-    ),
-    ...across.map((value) =>
-      svg("text", { class: "tick middle", x: frame.x(value), y: bottom + 18 }, tickLabel(value, step(across))),
-    ),
-    ...up.map((value) =>
-      svg(
-        "text",
-        { class: "tick end", x: MARGIN.left - 8, y: frame.y(value), dy: "0.32em" },
-        tickLabel(value, step(up)),
-      ),
-    ),
-  ];
 }
 
 function spot({ frame, scale }, vector, index) {

@@ -2,11 +2,10 @@
 
 import { magnifier } from "./built.js";
 import { lineChart } from "./chart.js";
-import { at, full, magnitude, peak, solved, state, total, usualPeak } from "./data.js";
+import { at, full, magnitude, nearest, peak, solved, state, total, usualPeak } from "./data.js";
 import { html, svg } from "./dom.js";
 import { fixed, quantity } from "./format.js";
 import { mechanismView } from "./mechanism.js";
-import { contactCharts, energyChart, listenToEvents, speedCharts, stateRows } from "./motion.js";
 import { listenToKeys, player } from "./player.js";
 import { polarChart } from "./polar.js";
 import { seatCharts } from "./seat.js";
@@ -17,41 +16,59 @@ export function kindOf(order) {
   return `k${order % 6} d${Math.floor(order / 6) % 4}`;
 }
 
+/** A chart with a curve for each entry of a list, {label or name, kind}, and its values. */
+function chartOf(title, unit, list, values, more = {}) {
+  const series = list.map((one, order) => ({ label: one.label ?? one.name, values: values(one), kind: one.kind ?? kindOf(order) }));
+  return { title, unit, series, ...more };
+}
+
+const filled = (...list) => list.filter(({ series }) => series.length);
+
 /** What `lineChart` draws of a scene, one entry for each chart that has something to show: {title, unit, series, …}. */
 export function charts(scene, kinds) {
-  const { count, sums, drivers, joints, motion } = scene;
-  const lost = total(
-    joints.map((joint) => joint.friction_power),
-    count,
-  );
-  const driven = motion ? drivers.filter((driver) => peak(driver.effort) > 0) : drivers;
-  const efforts = driven.map((driver) => effortChart(scene, driver));
-  const losses = lossChart(scene, kinds, lost);
-  /** @type {object[]} */
-  const reactions = [reactionChart(scene, kinds)];
-  if (scene.space === "spatial") reactions.push(momentChart(scene, kinds));
-  reactions.push(...endChart(scene, kinds));
-  const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost)];
-  const list = motion
-    ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...contactCharts(scene), ...reactions, ...losses, ...power]
-    : [...efforts, ...drivers.flatMap((driver) => rateChart(scene, driver)), ...losses, ...reactions, ...power];
-  if (sums.efficiency_instant) list.push(efficiencyChart(scene));
-  list.push(...slideChart(scene, kinds));
-  return [...list, ...errorCharts(scene, kinds)];
+  const { count, sums, drivers, motion } = scene;
+  const joints = scene.joints.map((joint) => ({ ...joint, kind: kinds.get(joint.name) }));
+  const course = (key) => (one) => full(one[key], count);
+  const lost = total(joints.map((joint) => joint.friction_power), count); // prettier-ignore
+  const rubbing = joints.filter(({ friction_power: power }) => peak(power) > 0);
+  const losses = filled(chartOf("Friction power by joint", "W", rubbing, course("friction_power")));
+  losses[0]?.series.unshift({ label: "all", values: lost, kind: "ink" });
+  const slides = joints.some(({ friction }) => peak(full(friction, count)) > 0);
+  const note = slides ? "Of a slide the normal force; its friction is not in it." : "";
+  const forces = chartOf("Joint reactions, magnitude", "N", joints, ({ reaction }) => magnitude(reaction, count), { note });
+  const turned = joints.filter(({ moment }) => scene.space === "spatial" && peak(magnitude(moment, count)) > 0);
+  const about = { note: "About the middle of the bearing; without drive and friction." };
+  const moments = chartOf("Reaction moments, magnitude", "N m", turned, ({ moment }) => magnitude(moment, count), about);
+  const loaded = joints.filter(({ end_load: load }) => load?.length);
+  const ends = filled(chartOf("Larger load on an end of bearing or guide", "N", loaded, course("end_load")));
+  const reactions = [{ ...forces, series: joined(forces.series) }, ...(scene.space === "spatial" ? [moments] : []), ...ends];
+  const efforts = drivers.filter(({ effort }) => !motion || peak(effort) > 0).map((driver) => effortChart(scene, driver));
+  // only masses exchange theirs where no power goes through it
+  const works = !motion || peak(lost, full(sums.useful_power, count), ...drivers.map(({ power }) => power)) > 0;
+  const power = works ? [powerChart(scene, lost)] : [];
+  const sliding = joints.filter(({ name, slide }) => slide?.length && name !== drivers[0]?.name); // that it is not over
+  return [
+    ...(motion ? ofMotion(motion, efforts, course) : efforts),
+    ...(motion ? [] : drivers.filter(({ speed }) => speed.length)
+      .map((driver) => chartOf(`Speed ${driver.name}`, driver.unit === "N" ? "m/s" : "rad/s", [{ ...driver, label: "speed" }], course("speed")))),
+    ...(motion ? [...reactions, ...losses] : [...losses, ...reactions]),
+    ...power,
+    ...(sums.efficiency_instant ? [efficiencyChart(scene)] : []),
+    ...filled(chartOf("Slide of joints", "m", sliding, course("slide"), { free: true })),
+    ...errorCharts(scene, kinds),
+  ]; // prettier-ignore
 }
 
-/** Whether power goes through it; only masses exchange theirs where there is none. */
-function moved(scene, lost) {
-  return peak(lost, full(scene.sums.useful_power, scene.count), ...scene.drivers.map(({ power }) => power)) > 0;
-}
-
-function lossChart(scene, kinds, lost) {
-  const losses = scene.joints
-    .map((joint) => ({ label: joint.name, values: full(joint.friction_power, scene.count), kind: kinds.get(joint.name) }))
-    .filter((one) => peak(one.values) > 0);
-  if (!losses.length) return [];
-  const series = [{ label: "all", values: lost, kind: "ink" }, ...losses];
-  return [{ title: "Friction power by joint", unit: "W", series }];
+/** Speeds of the free drivers, angles and lengths apart; efforts; works and energies; forces and gaps of joints in play. */
+function ofMotion({ free, energies, contacts }, efforts, course) {
+  const note = "Below 0 the surfaces press each other in.";
+  return filled(
+    ...["rad", "m"].map((unit) => chartOf("Speed", `${unit}/s`, free.filter((one) => one.unit === unit), course("rate"))),
+    ...efforts,
+    chartOf("Works and energies", "J", energies, course("values")),
+    chartOf("Contact forces", "N", contacts, course("force")),
+    chartOf("Gaps", "m", contacts, course("gap"), { note }),
+  ); // prettier-ignore
 }
 
 function efficiencyChart(scene) {
@@ -68,25 +85,21 @@ function efficiencyChart(scene) {
 }
 
 /** Errors of the worst points and of the outputs, and how the pins lie; dotted where a joint loses contact. */
-function errorCharts(scene, kinds) {
-  const { built, count } = scene;
+function errorCharts({ built, count }, kinds) {
   if (!built) return [];
-  const marks = built.lost;
-  const note = marks.length ? "Dotted: a joint loses contact." : "";
-  const list = [];
-  if (built.worst.length) {
-    const series = built.worst.map(({ label, values }, order) => ({ label, values: full(values, count), kind: kindOf(order) }));
-    list.push({ title: "Position errors, largest", unit: "m", series, marks, note });
-  }
-  for (const { label, unit, values } of built.outputs)
-    list.push({ title: `Transmission error, ${label}`, unit, marks, note, series: [{ label: "error", values: full(values, count), kind: "k0" }] }); // prettier-ignore
-  for (const [sign, title] of [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]]) {
-    const series = built.angles
-      .filter((one) => one.sign === sign)
-      .map(({ joint, values, breaks }) => ({ label: joint, values: full(values, count), breaks, kind: kinds.get(joint) }));
-    if (series.length) list.push({ title, unit: "°", series, marks, note });
-  }
-  return list;
+  const more = { marks: built.lost, note: built.lost.length ? "Dotted: a joint loses contact." : "" };
+  const course = ({ values }) => full(values, count);
+  const angles = [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]].map(([sign, title]) => {
+    const rows = built.angles.filter((one) => one.sign === sign);
+    const chart = chartOf(title, "°", rows, course, more);
+    chart.series.forEach((one, order) => Object.assign(one, { label: rows[order].joint, kind: kinds.get(rows[order].joint), breaks: rows[order].breaks }));
+    return chart;
+  });
+  return filled(
+    chartOf("Position errors, largest", "m", built.worst, course, more),
+    ...built.outputs.map((one) => chartOf(`Transmission error, ${one.label}`, one.unit, [{ ...one, label: "error" }], course, more)),
+    ...angles,
+  ); // prettier-ignore
 }
 
 function effortChart(scene, driver) {
@@ -101,91 +114,45 @@ function effortChart(scene, driver) {
   return { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band };
 }
 
-/** The speed of a driver over the cycle, where it varies. */
-function rateChart({ count }, { name, unit, speed }) {
-  if (!speed.length) return [];
-  const series = [{ label: "speed", values: full(speed, count), kind: "k0" }];
-  return [{ title: `Speed ${name}`, unit: unit === "N" ? "m/s" : "rad/s", series }];
-}
-
-function reactionChart(scene, kinds) {
-  const series = scene.joints.map((joint) => ({
-    label: joint.name,
-    values: magnitude(joint.reaction, scene.count),
-    kind: kinds.get(joint.name),
-  }));
-  const slides = scene.joints.some(({ friction }) => peak(full(friction, scene.count)) > 0);
-  const note = slides ? "Of a slide the normal force; its friction is not in it." : "";
-  return { title: "Joint reactions, magnitude", unit: "N", series: joined(series), note };
-}
-
 /** Series that are the same, drawn once with the names of all: "A = B". */
 function joined(series) {
   const near = 1e-6 * Math.max(0, ...series.map((one) => peak(one.values)));
-  const same = (one, other) =>
-    one.values.length === other.values.length &&
-    one.values.every((value, index) => {
-      const beside = other.values[index];
-      return Number.isFinite(value) ? Math.abs(value - beside) <= near : !Number.isFinite(beside);
-    });
-  const found = [];
+  const alike = (value, other) => (Number.isFinite(value) ? Math.abs(value - other) <= near : !Number.isFinite(other));
+  const list = [];
   for (const one of series) {
-    const first = found.find((other) => same(one, other));
+    const first = list.find(({ values }) => values.every((value, index) => alike(value, one.values[index])));
     if (first) first.label += ` = ${one.label}`;
-    else found.push({ ...one });
+    else list.push({ ...one });
   }
-  return found;
-}
-
-/** How far blocks are along their guides, without a driver that the chart is over. */
-function slideChart({ joints, drivers, count }, kinds) {
-  const sliding = joints.filter(({ name, slide }) => slide?.length && name !== drivers[0]?.name);
-  const series = sliding.map(({ name, slide }) => ({ label: name, values: full(slide, count), kind: kinds.get(name) }));
-  return series.length ? [{ title: "Slide of joints", unit: "m", series, free: true }] : [];
-}
-
-function momentChart(scene, kinds) {
-  const series = scene.joints
-    .map(({ name, moment }) => ({ label: name, values: magnitude(moment, scene.count), kind: kinds.get(name) }))
-    .filter((one) => peak(one.values) > 0);
-  const note = "About the middle of the bearing; without drive and friction.";
-  return { title: "Reaction moments, magnitude", unit: "N m", series, note };
-}
-
-function endChart(scene, kinds) {
-  const series = scene.joints
-    .filter(({ end_load }) => end_load?.length)
-    .map(({ name, end_load }) => ({ label: name, values: full(end_load, scene.count), kind: kinds.get(name) }));
-  return series.length ? [{ title: "Larger load on an end of bearing or guide", unit: "N", series }] : [];
+  return list;
 }
 
 function powerChart(scene, lost) {
   const { count } = scene;
-  const drive = total(
-    scene.drivers.map((driver) => driver.power),
-    count,
-  );
+  const drive = total(scene.drivers.map((driver) => driver.power), count); // prettier-ignore
   const useful = full(scene.sums.useful_power, count);
-  const rest = drive.map((value, index) =>
-    value === null || useful[index] === null || lost[index] === null ? null : value - useful[index] - lost[index],
-  );
+  const rest = drive.map((value, index) => ([value, useful[index], lost[index]].includes(null) ? null : value - useful[index] - lost[index]));
   const series = [
     { label: "drive", values: drive, kind: "k0" },
     { label: "useful", values: useful, kind: "k2" },
     { label: "friction", values: lost, kind: "k1" },
   ];
-  if (peak(rest) > 1e-6 * peak(drive, useful, lost))
-    series.push({ label: "masses, other loads", values: rest, kind: "quiet dashed" });
+  if (peak(rest) > 1e-6 * peak(drive, useful, lost)) series.push({ label: "masses, other loads", values: rest, kind: "quiet dashed" });
   return { title: "Power", unit: "W", series };
+}
+
+/** Coordinate and speed of every free driver at the present time, as [label, index => text]. */
+function stateRows({ motion }) {
+  return (motion?.free ?? []).flatMap(({ name, unit, coordinate, rate }) => [
+    [`${unit === "rad" ? "angle" : "slide"} ${name}`, (index) => quantity(at(coordinate, index), unit, peak(coordinate))],
+    [`speed ${name}`, (index) => quantity(at(rate, index), `${unit}/s`, peak(rate))],
+  ]);
 }
 
 /** The figures of the present position. */
 export function readout(scene) {
   const { abscissa, drivers, joints, count } = scene;
-  const lost = total(
-    joints.map((joint) => joint.friction_power),
-    count,
-  );
+  const lost = total(joints.map((joint) => joint.friction_power), count);
   const gap = abscissa.unit === "°" ? "" : "\u00a0";
   const rows = [
     [abscissa.label, (index) => fixed(abscissa.values[index], peak(abscissa.values)) + gap + abscissa.unit],
@@ -225,10 +192,7 @@ function vectorControls(scene, kinds, mechanism) {
   );
   const all = html("button", { type: "button", class: "plain" }, "none");
   const apply = () => {
-    mechanism.reactions(
-      boxes.filter((box) => box.checked).map((box) => box.value),
-      Number(size.value),
-    );
+    mechanism.reactions(boxes.filter((box) => box.checked).map((box) => box.value), Number(size.value));
     all.textContent = boxes.some((box) => box.checked) ? "none" : "all";
   };
   all.addEventListener("click", () => {
@@ -272,6 +236,17 @@ function polarPanel(scene, kinds, pick, place) {
   }
   fill(["x", "y"]);
   return panel;
+}
+
+/** Let the times in the table of events move the motion there. */
+function listenToEvents(table, scene, crank) {
+  if (!scene.motion) return;
+  const { values } = scene.abscissa;
+  const scale = scene.motion.duration > 0 ? values[values.length - 1] / scene.motion.duration : 1;
+  table?.addEventListener("click", (event) => {
+    const time = event.target.dataset?.time;
+    if (time !== undefined) crank.go(nearest(scene.abscissa, Number(time) * scale));
+  });
 }
 
 /** Build the page into its places; of these only the stage must be there. */

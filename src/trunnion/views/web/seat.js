@@ -3,7 +3,7 @@
 import { jumpsAt, told } from "./built.js";
 import { at, full, peak } from "./data.js";
 import { arrow } from "./arrow.js";
-import { html, onWidth, set, svg } from "./dom.js";
+import { figure, html, onWidth, set, svg } from "./dom.js";
 import { prefixed, quantity, short } from "./format.js";
 
 const PIN = 1.1; // radius of the pin as drawn, of the clearance: the radii are not to scale, the play is
@@ -36,13 +36,7 @@ function diagram(scene, seat, end, plane, kind) {
   const scale = prefixed(seat.clearance, "m");
   const loads = seat.ends.map(({ force }) => sizes(force, scene.count));
   const chart = { scene, seat, end, plane, kind, plot, remark, scale, index: 0, most: peak(...loads) };
-  const element = html(
-    "figure",
-    { class: "chart polar seat" },
-    html("figcaption", {}, html("span", { class: "title" }, title), html("span", { class: "unit" }, `[${scale.unit}]`), value),
-    plot,
-    remark,
-  );
+  const element = figure("chart polar seat", title, scale.unit, value, plot, remark);
   onWidth(plot, (width) => draw(chart, width), 220);
   return {
     element,

@@ -89,9 +89,7 @@ function ball(middle, radius) {
     const up = (ring / RINGS - 0.5) * Math.PI;
     for (let side = 0; side < SIDES; side += 1) {
       const angle = (2 * Math.PI * side) / SIDES;
-      points.push(
-        plus(middle, [Math.cos(up) * Math.cos(angle), Math.cos(up) * Math.sin(angle), Math.sin(up)], radius),
-      );
+      points.push(plus(middle, [Math.cos(up) * Math.cos(angle), Math.cos(up) * Math.sin(angle), Math.sin(up)], radius));
     }
   }
   const faces = Array.from({ length: RINGS }, (_, ring) => around(ring * SIDES, (ring + 1) * SIDES)).flat();
@@ -104,11 +102,7 @@ function box([middle, ...halves], more, step) {
   const w = dot(cross(u, v), edge) < 0 ? scaled(edge, -1) : edge;
   const points = [];
   const faces = [];
-  for (const [a, b, c] of [
-    [u, v, w],
-    [v, w, u],
-    [w, u, v],
-  ]) {
+  for (const [a, b, c] of [[u, v, w], [v, w, u], [w, u, v]]) {
     const [across, up] = [a, b].map((one) => Math.ceil((2 * Math.hypot(...one)) / step));
     const corner = (i, j, side) =>
       plus(plus(plus(middle, c, side), a, -1 + (2 * i) / across), b, -1 + (2 * j) / up);

@@ -2,11 +2,10 @@
 
 import { arrow, longest } from "./arrow.js";
 import { magnified, told } from "./built.js";
-import { steer } from "./camera.js";
+import { projection, steer } from "./camera.js";
 import { at, cause, magnitude, peak, quantile, solved, usualPeak } from "./data.js";
 import { html, onPaper, onWidth, set, svg } from "./dom.js";
 import { roundBelow, short, stated } from "./format.js";
-import { projection } from "./projection.js";
 import { meshes, paint, seen, shades, stroke } from "./solids.js";
 import { apply, plus, rotation, scaled } from "./vector.js";
 
@@ -404,9 +403,7 @@ function screws(view) {
     const pitch = 2 * Math.PI * at(screw.pitch, posed);
     const slides = scene.scaled && Math.abs(pitch) > 1e-6 * scene.size;
     const text = slides ? `${short(name)}, ${stated(Number(pitch.toPrecision(3)), "m")} a turn` : short(name);
-    lines.push(
-      svg("path", { class: `screw k${order % 6}`, d: straight(view, place, along, LINE * scene.size) }),
-    );
+    lines.push(svg("path", { class: `screw k${order % 6}`, d: straight(view, place, along, LINE * scene.size) }));
     const [x, y] = roomFor(view, spot(view, plus(place, along, 0.9 * LINE * scene.size)), text, used);
     labels.push(svg("text", { class: `screw-name k${order % 6}`, x: x.toFixed(1), y: y.toFixed(1) }, text));
   });
@@ -467,10 +464,7 @@ function loads(view) {
     if (!pose) return [];
     const [x, y] = spot(view, plus(apply(pose.turn, load.at), pose.place));
     const now = (what) => load.course?.[what]?.map((values) => values[view.posed] || 0) ?? load[what];
-    return [
-      [now("force"), "N", false],
-      [now("moment"), "N m", true],
-    ].flatMap(([vector, unit, twice]) => {
+    return [[now("force"), "N", false], [now("moment"), "N m", true]].flatMap(([vector, unit, twice]) => {
       const size = Math.hypot(...vector);
       if (!(size > 0)) return [];
       const turned = load.frame === "link" ? apply(pose.turn, vector) : vector;

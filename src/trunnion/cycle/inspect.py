@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.cycle.findings import Cycle, findings
 from trunnion.cycle.positions import positions
 from trunnion.errors import Finding, MechanismError, Severity
@@ -92,7 +92,7 @@ def _rank(walk: Forward) -> int | None:
         return None
     at = {name: tuple(place[:, np.argmax(solved)].tolist()) for name, place in places.items()}
     gears = {
-        name: (system.mechanism.coupled(name), float(np.ravel(primal(system.ratio(walk.values, name)))[0]))
+        name: (system.mechanism.coupled(name), single(system.ratio(walk.values, name)))
         for name in system.mechanism.gears
     }
     links = [link for module in system.plan.modules for link in module.links]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Place
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
 from trunnion.cycle.scales import scales_of
@@ -566,7 +566,7 @@ class LockingCourse:
         rubbing = {joint: scale_of(run.system, run.values, joint) for joint in felt(run.system, run.values)}
         alike = set(rubbing.values()) == {"coefficient"}
         paths = {f"joints.{joint}.friction.{scale}" for joint, scale in rubbing.items() if alike}
-        same = {float(np.ravel(primal(run.values[path]))[0]) if path in run.values else np.nan for path in paths}
+        same = {single(run.values[path]) if path in run.values else np.nan for path in paths}
         if len(same) == 1 and np.isfinite(value := same.pop()):
             subject = f"friction coefficient {subject}"
             figures.append(Figure("holding_coefficient", subject, multiple * value, *more))
@@ -584,7 +584,7 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
             not multiple > 0
         )
         return Figure(f"{joint}.critical_multiple", subject, multiple, place=place)
-    value = float(np.ravel(primal(run.values[f"joints.{joint}.friction.{parameter}"]))[0])
+    value = single(run.values[f"joints.{joint}.friction.{parameter}"])
     subject = f"critical friction {parameter} of {joint} alone"
     unit = law_of(run.system, joint).parameters[parameter].unit or "1"
     return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, unit, place=place)

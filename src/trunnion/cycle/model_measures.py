@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.figures import SIGNS
@@ -20,7 +20,6 @@ from trunnion.measures.measures import Measure, named, rate_of_angle
 from trunnion.measures.positions import ends_by_name
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parameters import measured
 from trunnion.results.attributes import MORE_THAN, Figure
 from trunnion.results.dataset import MemberUnits, Variable, described
 from trunnion.solve.forward import forward
@@ -241,7 +240,7 @@ def vocabulary(mechanism: Mechanism) -> Vocabulary:
     for measure in listed:
         value = float(figures.get(measure.name, np.nan))
         if not np.isfinite(value) and measure.name in starts:
-            value = float(np.ravel(primal(starts[measure.name][0]))[0])
+            value = single(starts[measure.name][0])
         unit, is_stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
         measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, is_stated))
     return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(of_cycle.findings))
@@ -249,13 +248,13 @@ def vocabulary(mechanism: Mechanism) -> Vocabulary:
 
 def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
     values, names = mechanism.parameters(), mechanism.parameter_names
-    kinds, shortest = measured(mechanism, mechanism.parameter_set.entries.values()), dict[str, str]()
+    kinds, shortest = mechanism.parameter_kinds(), dict[str, str]()
     for ending, paths in names.endings.items():
         path = paths[0]
         if len(paths) == 1 and len(ending) < len(shortest.get(path, path)) and mechanism.path_of(ending) == path:
             shortest[path] = ending  # it means this number, and no dimension or whole path
     for path, entry in mechanism.parameter_set.entries.items():
-        value = float(np.ravel(primal(values[path]))[0]) if path in values else float("nan")
+        value = single(values[path]) if path in values else float("nan")
         place = path.split(".")
         swept = path in values and not (place[0] == "measures" and place[2] in TIMES)
         name = path.removeprefix("dimensions.") if place[0] == "dimensions" else shortest.get(path, path)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import Frame
 from trunnion.joints.pairs import PAIRS
@@ -68,7 +68,7 @@ def scene_of(run: Run) -> dict[str, Any]:
 
 
 def _plain(frame: Frame) -> list[list[float]]:
-    return [[float(np.ravel(primal(n))[0]) for n in vector] for vector in (frame.place, frame.z, frame.x)]
+    return [[single(n) for n in vector] for vector in (frame.place, frame.z, frame.x)]
 
 
 def _play(system: System, values: Values, name: str) -> dict[str, Any] | None:
@@ -89,7 +89,7 @@ def _play(system: System, values: Values, name: str) -> dict[str, Any] | None:
 
 def _float(number: Number | None) -> float | None:
     """A number for JSON; None of what is not stated."""
-    value = None if number is None else float(np.ravel(primal(number))[0])
+    value = None if number is None else single(number)
     return value if value is not None and np.isfinite(value) else None
 
 

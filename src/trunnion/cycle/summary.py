@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.cycle.course import MOST_SUPPOSED, CycleCourse, magnitude
 from trunnion.cycle.fill import pin_area
 from trunnion.cycle.findings import Cycle, effort_units, findings
@@ -22,7 +22,7 @@ from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import Dimension, si_unit
+from trunnion.model.units import ANY
 from trunnion.results import variables as results
 from trunnion.results.attributes import KEPT, Figure, cited, encoded, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Result, driven
@@ -174,7 +174,7 @@ def _bearing(cycle: Cycle, course: CycleCourse, i: int, joint: str) -> Iterator[
     if top is not None and ends:
         yield course.figure(f"{joint}.end_load_max", f"load on an end of {joint}", top, "N", "maximum")
     if top is not None and has_pressure(mechanism, joint):
-        share = (2.0 if ends else 1.0) / float(np.ravel(primal(pin_area(cycle.run.values, joint)))[0])
+        share = (2.0 if ends else 1.0) / single(pin_area(cycle.run.values, joint))
         pressure = top._replace(value=top.value * share)
         yield course.figure(f"{joint}.pin_pressure_max", f"pin pressure of {joint}", pressure, "Pa", "maximum")
 
@@ -297,17 +297,11 @@ def balance(arrays: Arrays, floor: float) -> float:
 
 def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
     """Every number that was stated: path, SI value, unit, and the text of the model."""
-    values = mechanism.parameters()
-    dimensions: dict[str, Dimension | None] = {}
-    rows = []
-    for path, entry in mechanism.parameter_set.entries.items():  # dimensions first, in order of evaluation
-        unit = entry.kind.unit
-        if path.startswith("dimensions."):
-            name = path.removeprefix("dimensions.")
-            dimensions[name] = entry.quantity.check(dimensions)
-            unit = si_unit(dimensions[name])
+    values, kinds, rows = mechanism.parameters(), mechanism.parameter_kinds(), []
+    for path, entry in mechanism.parameter_set.entries.items():
         text = str(entry.quantity.source)
         if not entry.alias and text != "0":
             value = float(values[path]) if path in values else None  # an expression of the motion has many
-            rows.append({"path": path, "value": value, "unit": unit, "text": text})
+            plain = kinds[path] is ANY and path.startswith("dimensions.")  # its use alone tells its unit
+            rows.append({"path": path, "value": value, "unit": "" if plain else kinds[path].unit, "text": text})
     return rows

@@ -23,7 +23,7 @@ from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.joint_parts import Seat, has_play, play
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, item_name
+from trunnion.model.parameters import Location, item_name, measured
 from trunnion.model.places import assign, fields_at, schema_findings, stated_at, with_law
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import Cost, Variation
@@ -132,8 +132,8 @@ class Mechanism(Varying):
         return bool(self.seated) or any(numbers[path] != 0 for path in self.parameter_set.errors)
 
     def parameter_kinds(self) -> dict[str, Kind]:
-        """What each parameter measures, with its SI unit, by path."""
-        return {path: entry.kind for path, entry in self.parameter_set.entries.items()}
+        """What each parameter measures, with its SI unit, by path; of a dimension, as far as its value tells."""
+        return measured(self, self.parameter_set.entries.values())
 
     def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import single
 from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
@@ -302,7 +302,7 @@ def _dataset(
     radii = np.full((len(joints), loads.shape[2]), np.nan)
     for row, joint in zip(radii, joints, strict=True):
         for end, radius in enumerate(study.inputs.play(joint, run.values).radii):
-            row[end] = max(float(np.ravel(primal(radius))[0]), 0.0)
+            row[end] = max(single(radius), 0.0)
     arrays: dict[str, Array | NDArray[np.int8]] = {
         "value": np.array(table.curves),
         "worst_case": worst,

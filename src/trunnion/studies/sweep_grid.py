@@ -18,7 +18,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure, named
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import Dimension, normalise, si_unit, unit
+from trunnion.model.units import ANY, normalise, unit
 from trunnion.results.dataset import Variable
 from trunnion.solve.run import Run
 from trunnion.solve.system import System
@@ -158,17 +158,13 @@ def _swept(mechanism: Mechanism, name: str, path: str, sweep_values: Any) -> Swe
 
 
 def _unit_of(mechanism: Mechanism, path: str) -> str:
-    """SI unit of a number; of a dimension, as its value tells."""
-    dimensions: dict[str, Dimension | None] = {}
-    for other, entry in mechanism.parameter_set.entries.items():  # dimensions first, in order of evaluation
-        if other.startswith("dimensions."):
-            dimensions[other.removeprefix("dimensions.")] = entry.quantity.check(dimensions)
-    name = path.removeprefix("dimensions.")
-    is_dimension = name in dimensions and name != path
-    return si_unit(dimensions[name]) if is_dimension else mechanism.parameter_set.entries[path].kind.unit
+    """SI unit of a number; of a dimension that is a plain number none, for its use alone tells."""
+    kind = mechanism.parameter_kinds()[path]
+    return "" if kind is ANY and path.startswith("dimensions.") else kind.unit
 
 
 def say(swept: Sequence[Swept], index: Sequence[int]) -> str:
+    """A point of the grid as equations."""
     return ", ".join(number.say(int(i)) for number, i in zip(swept, index, strict=True))
 
 

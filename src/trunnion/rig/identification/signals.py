@@ -19,7 +19,6 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parameters import measured
 from trunnion.model.rules import Within
 from trunnion.rig.modelled import turned
 from trunnion.solve import shifts
@@ -249,7 +248,7 @@ def unknowns(
         what = f"'{extra[0]}' is not one of the parameters"
         raise MechanismError(Finding(what, "start", f"they are {', '.join(paths)}"))
     values = mechanism.parameters()
-    kinds = measured(mechanism, mechanism.parameter_set.entries.values())
+    kinds = mechanism.parameter_kinds()
     sought, findings = [], []
     for name, members in paths.items():
         where = f"parameter {name}"

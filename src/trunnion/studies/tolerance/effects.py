@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.model.tolerances import FULL_TURN
 from trunnion.solve.shifts import CARRIERS
@@ -109,7 +109,7 @@ class Effects:
         deviations: dict[str, Number] = {}  # a number that follows from others goes on to do so
         seats: dict[str, Number] = {}
         for path in moved:
-            nominal = float(np.ravel(primal(self.inputs.run.values.get(path, 0.0)))[0])
+            nominal = single(self.inputs.run.values.get(path, 0.0))
             start = about.get(path, nominal)
             real = np.array([[row.real.get(path, start) - nominal] for row in self.rows])
             number: Number = real
@@ -156,7 +156,7 @@ class Effects:
     def nominal(self, number: int | str) -> float:
         """Nominal value of a toleranced number, or of a number by its path."""
         path = number if isinstance(number, str) else self.inputs.tolerances[number].path
-        return float(np.ravel(primal(self.inputs.run.values[path]))[0])
+        return single(self.inputs.run.values[path])
 
     def numbers(self) -> dict[str, Array]:
         """Of every parameter: nominal value, limits of its deviation, standard deviation and mean; of a clearance the
@@ -221,7 +221,7 @@ class Effects:
         for joint in self.inputs.loose:
             rooms[joint] = []
             for radius in self.inputs.play(joint, self.inputs.duals).radii:
-                start = float(np.ravel(primal(radius))[0])
+                start = single(radius)
                 slope = self.inputs.derivatives(radius)[:count]
                 most = start + float(np.sum(np.maximum(slope * lower, slope * upper)))
                 mean = start + float(slope @ population.means)

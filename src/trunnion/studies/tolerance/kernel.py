@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.cycle.cycle_kernel import Engine
 from trunnion.dynamics.measured import MotionKernel, courses_in_time
@@ -63,7 +63,7 @@ class LoadedKernel(MotionKernel):
             while len(self.runs) >= MOST_RUNS:
                 self.runs.pop(next(iter(self.runs)))
             end = moved(self.run, numbers_of_lane, np.array([self.run.cycle.duration]))
-            cycle = replace(self.run.cycle, duration=float(np.ravel(primal(end))[0]))
+            cycle = replace(self.run.cycle, duration=single(end))
             self.runs[key] = replace(self.run, values=numbers_of_lane, cycle=cycle)
         return self.runs[key]
 

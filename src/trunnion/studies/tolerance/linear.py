@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.dual import Dual, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import selected
 from trunnion.cycle.cycle_kernel import Engine
@@ -28,7 +28,6 @@ from trunnion.measures.figures import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure, chosen, near, outputs, within
 from trunnion.measures.positions import PositionPlan, moved, place_of, plan
-from trunnion.model.fields import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -498,10 +497,8 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None) -> WorstCorn
         raise MechanismError(Finding("has no worst corner: the figure is undefined", f"measures.{name}"))
     side_index = SIDES.index(side) if side in SIDES else int(abs(largest) >= abs(least))
     values_there = replace(effects, rows=(EffectRow(NOBODY, 0, {}, ""),)).values(ends[side_index].at)
-    numbers = {path: float(np.ravel(primal(number))[0]) for path, number in values_there.items()}
-    dimensions = {f"dimensions.{dimension}": kind for dimension, kind in dimension_kinds(mechanism).items()}
-    kinds = {**mechanism.parameter_kinds(), **dimensions}
-    rows = []
+    numbers = {path: single(number) for path, number in values_there.items()}
+    kinds, rows = mechanism.parameter_kinds(), []
     for i, tolerance in enumerate(prepared.inputs.tolerances):
         if of.figure.spread.half[i] != 0:  # else it does nothing to the measure
             kind = kinds.get(tolerance.path)

@@ -13,7 +13,6 @@ from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
-from trunnion.model.fields import dimension_kinds
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
@@ -135,8 +134,7 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     arrays |= outcome.indices.arrays if outcome.indices else {}
     units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
     curve_units = [measure.unit(system) for measure in study.measures]
-    dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
-    kinds = {**mechanism.parameter_kinds(), **dimensions}
+    kinds = mechanism.parameter_kinds()
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in study.inputs.names]
     dial = system.dial(study.run.values, table.plan.times)
     variables = described(arrays, VARIABLES, _units(units, curve_units, parameter_units, dial.unit))

@@ -235,8 +235,8 @@ def vocabulary(mechanism: Mechanism) -> Vocabulary:
     figures = dict(zip((item.name for item in of_cycle.measures), of_cycle.figures, strict=True))
     listed = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
     open_ = run.determinacy is not None and any(item.severity is Severity.ERROR for item in run.determinacy.findings())
-    single = [item for item in listed if item.single(run.system) and (item.of_motion or not open_)]
-    starts, measures = courses_of(run, single, np.zeros(1), FrictionMethod())[0], []
+    courses = [item for item in listed if item.single(run.system) and (item.of_motion or not open_)]
+    starts, measures = courses_of(run, courses, np.zeros(1), FrictionMethod())[0], []
     for measure in listed:
         value = float(figures.get(measure.name, np.nan))
         if not np.isfinite(value) and measure.name in starts:

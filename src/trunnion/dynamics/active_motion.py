@@ -70,6 +70,7 @@ class ActiveMotion(Integration):
 
     # ---- from event to event ------------------------------------------------------------------------------------
 
+    @np.errstate(all="ignore")
     def run(self, row: Array) -> Solution:
         """The motion from an initial row; contacts that last at its end have an end that is not known."""
         at = self.moment(self.start, row)
@@ -115,12 +116,11 @@ class ActiveMotion(Integration):
                 return assembled
             self.mode = self.mode._replace(senses=(int(np.sign(row[n])),))
         at = self.moment(start, row)
-        with np.errstate(all="ignore"):
-            second = self.dynamics(at).second
-            if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
-                ahead = at.q + np.sign(row[n]) * self._inside(row[0])
-                second = self.dynamics(at._replace(q=ahead)).second
-                self.bends = (*self.bends, float(row[0] % self.places.period if self.places.period else row[0]))
+        second = self.dynamics(at).second
+        if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
+            ahead = at.q + np.sign(row[n]) * self._inside(row[0])
+            second = self.dynamics(at._replace(q=ahead)).second
+            self.bends = (*self.bends, float(row[0] % self.places.period if self.places.period else row[0]))
         if not np.all(np.isfinite(second)):
             cause = self._cause(start, row) or "no_acceleration"
             if self._locked(start, row, [cause]):
@@ -193,8 +193,7 @@ class ActiveMotion(Integration):
 
     def _look(self, dense: Dense, times: Array) -> Seen:
         """The contacts at times of a step."""
-        with np.errstate(all="ignore"):
-            return self.dynamics.look(self.layout.moment(times, np.asarray(dense(times)), self.mode))
+        return self.dynamics.look(self.layout.moment(times, np.asarray(dense(times)), self.mode))
 
     def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
         mechanism = self.motion.system.mechanism
@@ -204,8 +203,7 @@ class ActiveMotion(Integration):
             return None
 
         def values(times: Array) -> Array:
-            with np.errstate(all="ignore"):
-                rows = [row for *_, row in self._guards(stretch.at(self.layout, times))]
+            rows = [row for *_, row in self._guards(stretch.at(self.layout, times))]
             return np.array(rows).reshape(len(rows), len(times))
 
         return values
@@ -264,8 +262,7 @@ class ActiveMotion(Integration):
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """Let a contact begin or end, or a clutch; of a joint that is decided before the next step."""
         at = self.moment(crossing.time, row)
-        with np.errstate(all="ignore"):
-            kind, k, _ = self._guards(at)[crossing.row]
+        kind, k, _ = self._guards(at)[crossing.row]
         match kind:
             case "contact":
                 return self._met(k, crossing.time, row)
@@ -322,25 +319,24 @@ class ActiveMotion(Integration):
         closed = any(isinstance(onset, Closed) for onset in self.onsets)
         if not (self.motion.resisted or closed):
             return True
-        with np.errstate(all="ignore"):
-            case = ActiveSet(self.motion, float(np.max(self.pace))).of(at, before, crossed)
-            if case.senses is None:
-                if self._jammed(time, row, case.base):
-                    return self._decided(time, row)
-                self._stop("no_contact_force" if closed else "no_acceleration", time, row)
-                return False
-            sticks = [k for k in case.may if case.senses[k] == 0]
-            self.mode = self.mode._replace(senses=case.senses)
-            self._let(time, case.onsets)
-            if sticks and (not before or any(before[k] for k in sticks)):
-                row[n : 2 * n] = self.motion.stopped(self.moment(time, row), sticks)
-            for k in case.may:
-                was, joint = before[k] if before else None, self.motion.resisted[k]
-                if case.senses[k] == 0 and was != 0:
-                    self._note(time, "stick", of=joint)
-                elif case.senses[k] != 0 and not was:
-                    self._note(time, "break-away", float(case.senses[k]), of=joint)
-            self._rests(time, row, sticks)
+        case = ActiveSet(self.motion, float(np.max(self.pace))).of(at, before, crossed)
+        if case.senses is None:
+            if self._jammed(time, row, case.base):
+                return self._decided(time, row)
+            self._stop("no_contact_force" if closed else "no_acceleration", time, row)
+            return False
+        sticks = [k for k in case.may if case.senses[k] == 0]
+        self.mode = self.mode._replace(senses=case.senses)
+        self._let(time, case.onsets)
+        if sticks and (not before or any(before[k] for k in sticks)):
+            row[n : 2 * n] = self.motion.stopped(self.moment(time, row), sticks)
+        for k in case.may:
+            was, joint = before[k] if before else None, self.motion.resisted[k]
+            if case.senses[k] == 0 and was != 0:
+                self._note(time, "stick", of=joint)
+            elif case.senses[k] != 0 and not was:
+                self._note(time, "break-away", float(case.senses[k]), of=joint)
+        self._rests(time, row, sticks)
         return True
 
     def _alone(self, time: float, row: Array) -> None:
@@ -401,8 +397,7 @@ class ActiveMotion(Integration):
         """As of any motion; where several coordinates are free, some joints lock."""
         if not (self.motion.several and self.motion.resisted):
             return super()._locked(time, row, causes)
-        with np.errstate(all="ignore"):
-            return bool({"locked", "no_acceleration"} & set(causes)) and self._jammed(time, row, self.mode.senses)
+        return bool({"locked", "no_acceleration"} & set(causes)) and self._jammed(time, row, self.mode.senses)
 
     def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
         """Whether all free coordinates rest from here on, in what resists the joints."""

@@ -101,8 +101,7 @@ class Integration:
         return self.motion.followed[0].snapshot if self.motion.followed else None
 
     def _follow(self, time: float, row: Array) -> None:
-        with np.errstate(all="ignore"):
-            self.motion.step(self.moment(time, row))
+        self.motion.step(self.moment(time, row))
 
     # ---- in motion --------------------------------------------------------------------------------------------
 
@@ -150,8 +149,7 @@ class Integration:
                 numbers_asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
                     numbers_asked[n] = 0.0
-            with np.errstate(all="ignore"):
-                second, others, sound, _ = self.dynamics(self.moment(moment, numbers_asked))
+            second, others, sound, _ = self.dynamics(self.moment(moment, numbers_asked))
             return np.concatenate([speeds, second, others]) if sound else np.full(len(numbers), np.nan)
 
         return rate
@@ -301,8 +299,7 @@ class Integration:
     def _stop(self, code: str, time: float, row: Array) -> None:
         figures = {"coordinate": float(row[0]), "rate": float(row[self.layout.coordinates])}
         if code in ("no_acceleration", "locked"):
-            with np.errstate(all="ignore"):
-                growth = float(np.min(self.motion.growth(self.moment(time, row))))
+            growth = float(np.min(self.motion.growth(self.moment(time, row))))
             code = "no_acceleration" if growth <= 0.0 else "unsolved"
             figures |= {"growth": growth} if growth <= 0.0 else {}
         self.end(code, time, figures)
@@ -312,13 +309,11 @@ class Integration:
         at = self.moment(time, row)
         if not self._assembled(at):
             return "not_assembled"
-        with np.errstate(all="ignore"):
-            rates = self.dynamics(at)
+        rates = self.dynamics(at)
         return "" if rates.sound else "locked" if rates.locked else "no_acceleration"
 
     def _assembled(self, at: Moment) -> bool:
-        with np.errstate(all="ignore"):
-            status = pose_status(self.motion.walk(at, np.zeros_like(at.q)), (1,))
+        status = pose_status(self.motion.walk(at, np.zeros_like(at.q)), (1,))
         return int(status[0]) != Status.NOT_ASSEMBLED
 
     def _kinetic(self, time: float, row: Array) -> float:

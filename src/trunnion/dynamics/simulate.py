@@ -241,7 +241,6 @@ class Continued:
         self._end = filled(self.motion, solution, np.array([self.time]))
         return self._end
 
-    @np.errstate(all="ignore")
     def _moved(self, until: float) -> ActiveMotion:
         """The integration from now to a time, s."""
         if self._applied != self.inputs:

@@ -217,8 +217,7 @@ def instant_centres(walk: Forward, count: int, most: int) -> list[Centre]:
         along, across, turn, vx, vy, size, pace = (
             np.broadcast_to(np.asarray(primal(part), float), (count,)) for part in numbers
         )
-        with np.errstate(all="ignore"):  # a link that only slides has its centre at infinity
-            x, y = -across / turn, along / turn
+        x, y = -across / turn, along / turn
         speed = np.hypot(vx, vy)
         still = (np.abs(turn) <= AT_REST * pace) & (speed <= AT_REST * pace * size)
         away = ~(np.hypot(x, y) <= FAR * size) & (speed > AT_REST * pace * size)
@@ -365,9 +364,8 @@ def motor(run: Run, driver: str) -> tuple[float, float, float, float]:
     i = list(run.system.mechanism.drivers).index(driver)
     course = course_of(run, FrictionMethod(), names=("drive_effort", "drive_power"))
     power, peak = course.picked("drive_power", i), course.extreme("drive_power", i, of=magnitude)
-    with np.errstate(all="ignore"):
-        square = course.picked("drive_effort", i).mean(np.square)[0]
-        value, size = float(power.mean()[0]), float(power.mean(np.abs)[0])
+    square = course.picked("drive_effort", i).mean(np.square)[0]
+    value, size = float(power.mean()[0]), float(power.mean(np.abs)[0])
     mean = Mean(value, float(power.error()[0]), size, CANCELLED * size).net
     # the energy is level where the power is the mean, or at an edge
     cut = power.parted(power.passages(0, mean))

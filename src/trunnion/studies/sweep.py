@@ -406,6 +406,7 @@ class Points:
             numbers_of[number.path] = numbers + (0.0 if ideal or not error else self.run.values[error])
         return mechanism.ideal_parameters(numbers_of) if ideal else mechanism.parameters(numbers_of)
 
+    @np.errstate(all="ignore")
     def _together(self, points: Sequence[Index]) -> list[Reduced | None]:
         """Figures of some points; None where a point has to be looked at alone."""
         run, shape = self.run, (len(points), self.steps)
@@ -418,20 +419,19 @@ class Points:
             if value is not values[path]:
                 errs |= np.broadcast_to(np.not_equal(value, values[path]), (len(points), 1))[:, 0]
         self.erring = self.erring or bool(errs.any())
-        with np.errstate(all="ignore"):
-            ours = _as_chosen(run, values, len(points))
-            meant = ideal_values if errs.any() else None
-            arrays, ideal = self._many.filled(values, meant, time, shape, (), self.method, self.method)
-            ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
-            if self._followed:
-                ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
-            answered = ours & np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1)
-            courses = self._courses(values, meant, cycles, answered)
-            margins = self._courses(values, None, cycles, ours, margins=True) if self.margin else {}
-            likes: dict[int, CycleCourse] = {}
-            if errs.any():
-                answered = ours & errs & np.all(ideal["status"] < Status.NOT_CONVERGED, axis=1)
-                likes = self._courses(ideal_values, None, cycles, answered)
+        ours = _as_chosen(run, values, len(points))
+        meant = ideal_values if errs.any() else None
+        arrays, ideal = self._many.filled(values, meant, time, shape, (), self.method, self.method)
+        ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
+        if self._followed:
+            ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
+        answered = ours & np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1)
+        courses = self._courses(values, meant, cycles, answered)
+        margins = self._courses(values, None, cycles, ours, margins=True) if self.margin else {}
+        likes: dict[int, CycleCourse] = {}
+        if errs.any():
+            answered = ours & errs & np.all(ideal["status"] < Status.NOT_CONVERGED, axis=1)
+            likes = self._courses(ideal_values, None, cycles, answered)
         figures: list[Reduced | None] = []
         for i in range(len(points)):
             rows = {name: array[..., i, :] for name, array in arrays.items()}
@@ -480,7 +480,7 @@ class Points:
         numbers.nominal = {path: nth(value, 0) for path, value in values.items()}
         for k, index in enumerate(points):
             numbers.nominal.update((path, nth(value, k)) for path, value in changed.items())
-            with at_point(self.swept, index), np.errstate(all="ignore"):
+            with at_point(self.swept, index):
                 findings = check_values(mechanism, numbers, changed)
                 wrong = [finding for finding in findings if finding.severity is Severity.ERROR]
                 if wrong:

@@ -203,9 +203,8 @@ def _linear(study: ToleranceStudy, table: Table) -> dict[str, Any]:
     total = Spread(*np.array([of.total for of in rows], float).reshape(-1, 5).T)
     halves = np.array([of.figure.spread.half for of in rows])
     scatter = np.array([of.figure.covariances for of in rows])
-    with np.errstate(all="ignore"):
-        shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
-        variance = scatter / np.sum(scatter, axis=1, keepdims=True)
+    shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
+    variance = scatter / np.sum(scatter, axis=1, keepdims=True)
     return {
         "nominal": np.array([of.nominal for of in rows]),
         "place": np.array(places, float),

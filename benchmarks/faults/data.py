@@ -265,7 +265,7 @@ _CLI = (
     ),
     Fault(
         "bad-input-is-a-finding",
-        "cli/edge.py",
+        "cli/app.py",
         "BAD_INPUT, FAULT, STOPPED = 2, 3, 130",
         "BAD_INPUT, FAULT, STOPPED = 1, 3, 130",
         ("tests/manual/test_cli_options.py", "tests/manual/test_cli_files.py"),

@@ -19,7 +19,7 @@ from manual.conftest import Run
 from manual.test_cli import EXAMPLES, FOUR_BAR
 from trunnion import read
 from trunnion.cli import app as cli
-from trunnion.cli.files import outputs
+from trunnion.cli.options import outputs
 from trunnion.cycle import analyse as analysing
 
 

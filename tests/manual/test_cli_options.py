@@ -14,7 +14,7 @@ from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion.cli import app as cli
 from trunnion.cli.options import PLOT_KINDS, over, points
-from trunnion.cli.terminal import QUIET, say, show_rows
+from trunnion.cli.result import QUIET, say, show_rows
 from trunnion.cycle.model_measures import NamedNumber, vocabulary
 from trunnion.errors import Finding, Severity
 from trunnion.views.cycle import PLOTS

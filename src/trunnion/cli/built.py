@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from typer import Option
 
-from trunnion.cli.files import verb
-from trunnion.cli.options import CURVES, IMAGES, ONE_POSITION, WRITTEN, Files, Model, named_file, share
-from trunnion.cli.result import Shown, check_files, check_model, exit_status
-from trunnion.cli.terminal import bar, line
+from trunnion.cli.options import CURVES, IMAGES, ONE_POSITION, WRITTEN, Files, Model, named_file, share, verb
+from trunnion.cli.result import Shown, bar, check_files, check_model, exit_status, line
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import findings_of
 

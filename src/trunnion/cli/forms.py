@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from trunnion.cli.built import allocate, assemble, play, tolerance
-from trunnion.cli.files import options_of, types_in
 from trunnion.cli.measured import compare, identify
-from trunnion.cli.motion import design, locking, simulate
-from trunnion.cli.sweep import sweep
+from trunnion.cli.motion import design, locking, simulate, sweep
+from trunnion.cli.options import options_of, types_in
 
 __all__ = ["forms"]
 

@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 import typer
 from typer import Argument
 
-from trunnion.cli.files import verb
-from trunnion.cli.options import DATA, Files, Model, setting
-from trunnion.cli.result import Shown, check_files, check_model, exit_status, show_tables
-from trunnion.cli.terminal import bar, line, say, wrote
+from trunnion.cli.options import DATA, Files, Model, setting, verb
+from trunnion.cli.result import Shown, bar, check_files, check_model, exit_status, line, say, show_tables, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.results.attributes import findings_of
 

@@ -29,6 +29,4 @@ def test_values_by_hand() -> None:
 @pytest.mark.parametrize("model", sorted(COST_MODELS))
 def test_cost_that_no_tolerance_changes(model: str) -> None:
     """Without B a tolerance of 0 costs A, and its slope is 0."""
-    found = COST_MODELS[model]
-    numbers = {"A": 2.0, "B": 0.0, "k": 0.5, "unit": 1e-3}
-    assert [part(0.0, **numbers) for part in (found.value, found.slope)] == [2.0, 0.0]
+    assert COST_MODELS[model].of(0.0, A=2.0, B=0.0, k=0.5, unit=1e-3) == (2.0, 0.0)

@@ -1,8 +1,8 @@
 """What a tolerance costs, by its half width t (of a clearance: the radial clearance).
 
-A model is two functions, the cost and its slope over t, and one entry of `COST_MODELS`. Both models
-fall and are convex in t wherever B ≥ 0 and k > 0; the power model is convex in log t too, the exponential one only
-where k t ≥ unit. So an allocation is solved in t, where it is convex with either.
+A model is a function, of the cost and its slope over t, and one entry of `COST_MODELS`. Both models fall and are convex
+in t wherever B ≥ 0 and k > 0; the power model is convex in log t too, the exponential one only where k t ≥ unit. So an
+allocation is solved in t, where it is convex with either.
 """
 
 from __future__ import annotations
@@ -20,36 +20,29 @@ __all__ = ["COST_MODELS", "Cost", "CostModel"]
 class CostModel:
     """A cost of a tolerance, with its derivative with respect to the half width.
 
-    value, slope: of (t, *, A, B, k, unit), t the half width, m or rad; parameters: what each means; cone: the cone of
-    a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
+    of: (t, *, A, B, k, unit) → cost and slope, t the half width, m or rad; parameters: what each means; cone: the cone
+    of a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
     """
 
-    value: Callable[..., float]
-    slope: Callable[..., float]
+    of: Callable[..., tuple[float, float]]
     parameters: Mapping[str, str]
     formula: str
     source: str
     cone: Literal["power", "exponential"]
 
 
-def power(t: float, *, A: float, B: float, k: float, unit: float) -> float:
-    """A + B/(t/unit)^k: cost of a half width t, m or rad; unbounded as t falls to 0."""
-    return A + B * (t / unit) ** -k if t > 0 else (np.inf if B else A)
+def power(t: float, *, A: float, B: float, k: float, unit: float) -> tuple[float, float]:
+    """A + B/(t/unit)^k, and −k B/unit (t/unit)^(−k − 1); unbounded as t falls to 0, unless nothing depends on t."""
+    if not B or t <= 0:
+        return (np.inf, -np.inf) if B else (A, 0.0)
+    varying = B * (t / unit) ** -k
+    return A + varying, -k * varying / t
 
 
-def power_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float:
-    """−k B/unit (t/unit)^(−k − 1)."""
-    return float(-k * B / unit * (t / unit) ** (-k - 1)) if B else 0.0  # also where t is 0, and the cost A
-
-
-def exponential(t: float, *, A: float, B: float, k: float, unit: float) -> float:
-    """A + B exp(−k t/unit): cost of a half width t, m or rad; A + B at t = 0."""
-    return A + B * float(np.exp(-k * t / unit))
-
-
-def exponential_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float:
-    """−k B/unit exp(−k t/unit)."""
-    return -k * B / unit * float(np.exp(-k * t / unit))
+def exponential(t: float, *, A: float, B: float, k: float, unit: float) -> tuple[float, float]:
+    """A + B exp(−k t/unit), and −k B/unit exp(−k t/unit); A + B at t = 0."""
+    varying = B * float(np.exp(-k * t / unit))
+    return A + varying, -k * varying / unit
 
 
 _PARAMETERS = {
@@ -62,7 +55,6 @@ _PARAMETERS = {
 COST_MODELS: dict[str, CostModel] = {
     "power": CostModel(
         power,
-        power_slope,
         _PARAMETERS,
         "A + B/(t/unit)^k",
         "G. H. Sutherland and B. Roth, Mechanism design: accounting for manufacturing tolerances and costs in "
@@ -71,7 +63,6 @@ COST_MODELS: dict[str, CostModel] = {
     ),
     "exponential": CostModel(
         exponential,
-        exponential_slope,
         _PARAMETERS,
         "A + B exp(−k t/unit)",
         "F. H. Speckhart, Calculation of tolerance based on a minimum cost approach, ASME Journal of Engineering for "
@@ -94,8 +85,8 @@ class Cost:
 
     def value(self, t: float) -> float:
         """Cost of a half width t, m or rad."""
-        return COST_MODELS[self.model].value(t, **self.numbers())
+        return COST_MODELS[self.model].of(t, **self.numbers())[0]
 
     def slope(self, t: float) -> float:
         """Rise of the cost with t: never above zero."""
-        return COST_MODELS[self.model].slope(t, **self.numbers())
+        return COST_MODELS[self.model].of(t, **self.numbers())[1]

@@ -31,15 +31,14 @@ class Distribution:
     """A kind of distribution of deviations.
 
     parameters: names of the options with their defaults; None: worked out, or (`values`) must be given.
-    quantile: (u, lower, upper, options) → array of the shape of u; mean, variance: (lower, upper, options).
+    quantile: (u, lower, upper, options) → array of the shape of u; moments: (lower, upper, options) → mean, variance.
     bounded: whether no deviation lies outside its limits; sample and direction are bounded by their own values.
     """
 
     name: str
     long_name: str
     quantile: Callable[[Floats, float, float, Options], Floats]
-    mean: Callable[[float, float, Options], float]
-    variance: Callable[[float, float, Options], float]
+    moments: Callable[[float, float, Options], tuple[float, float]]
     parameters: Mapping[str, float | None] = field(default_factory=dict)
     bounded: bool = True
 
@@ -72,6 +71,11 @@ def _normal_quantile(u: Floats, lower: float, upper: float, options: Options) ->
     return np.asarray(mean + sigma * special.ndtri(u), dtype=np.float64)
 
 
+def _normal_moments(lower: float, upper: float, options: Options) -> tuple[float, float]:
+    mean, sigma = normal_parameters(lower, upper, options)
+    return mean, sigma**2
+
+
 # ---- triangular -----------------------------------------------------------------------------------------------
 
 
@@ -85,6 +89,12 @@ def _triangular_quantile(u: Floats, lower: float, upper: float, options: Options
     left = lower + np.sqrt(u * (width * (mode - lower)))
     right = upper - np.sqrt((1 - u) * (width * (upper - mode)))
     return np.clip(np.where(u * width < mode - lower, left, right), lower, upper)
+
+
+def _triangular_moments(lower: float, upper: float, options: Options) -> tuple[float, float]:
+    """Mean, and variance (w² − (mode − lower)(upper − mode))/18, w = upper − lower."""
+    mode = _mode(lower, upper, options)
+    return (lower + upper + mode) / 3, ((upper - lower) ** 2 - (mode - lower) * (upper - mode)) / 18
 
 
 # ---- truncated normal -----------------------------------------------------------------------------------------
@@ -157,6 +167,13 @@ def _beta_quantile(u: Floats, lower: float, upper: float, options: Options) -> F
     return np.asarray(np.where(u <= 0.5, below, above), dtype=np.float64)
 
 
+def _beta_moments(lower: float, upper: float, options: Options) -> tuple[float, float]:
+    """Mean, and variance w² α β/((α + β)² (α + β + 1))."""
+    alpha, beta = _shapes(options)
+    both = alpha + beta
+    return (lower * beta + upper * alpha) / both, (upper - lower) ** 2 * alpha * beta / (both**2 * (both + 1))
+
+
 # ---- sample ---------------------------------------------------------------------------------------------------
 
 
@@ -171,55 +188,33 @@ def _sample_quantile(u: Floats, lower: float, upper: float, options: Options) ->
     return values[np.clip(place, 0, values.size - 1)]
 
 
-def _triangular_variance(lower: float, upper: float, options: Options) -> float:
-    """(w² − (mode − lower)(upper − mode))/18, w = upper − lower."""
-    mode = _mode(lower, upper, options)
-    return ((upper - lower) ** 2 - (mode - lower) * (upper - mode)) / 18
-
-
-def _beta_moments(lower: float, upper: float, options: Options) -> tuple[float, float]:
-    """Mean, and variance w² α β/((α + β)² (α + β + 1))."""
-    alpha, beta = _shapes(options)
-    both = alpha + beta
-    return (lower * beta + upper * alpha) / both, (upper - lower) ** 2 * alpha * beta / (both**2 * (both + 1))
-
-
 CAPABILITY: Mapping[str, float | None] = {"cp": 1.0, "cpk": None, "shift": None}
 DISTRIBUTIONS: dict[str, Distribution] = {entry.name: entry for entry in (
     Distribution(
-        "normal", "normal, spread by the capability of the process", _normal_quantile,
-        lambda lower, upper, options: normal_parameters(lower, upper, options)[0],
-        lambda lower, upper, options: normal_parameters(lower, upper, options)[1] ** 2, CAPABILITY, bounded=False,
+        "normal", "normal, spread by the capability of the process", _normal_quantile, _normal_moments, CAPABILITY,
+        bounded=False,
     ),
     Distribution(
         "uniform", "uniform between the limits",
         lambda u, lower, upper, options: lower + (upper - lower) * np.asarray(u),
-        lambda lower, upper, options: (lower + upper) / 2, lambda lower, upper, options: (upper - lower) ** 2 / 12,
+        lambda lower, upper, options: ((lower + upper) / 2, (upper - lower) ** 2 / 12),
     ),
     Distribution(
-        "triangular", "triangular between the limits", _triangular_quantile,
-        lambda lower, upper, options: (lower + upper + _mode(lower, upper, options)) / 3, _triangular_variance,
-        {"mode": None},
+        "triangular", "triangular between the limits", _triangular_quantile, _triangular_moments, {"mode": None},
     ),
+    Distribution("truncated", "normal, cut off at the limits", _truncated_quantile, _truncated_moments, CAPABILITY),
     Distribution(
-        "truncated", "normal, cut off at the limits", _truncated_quantile,
-        lambda lower, upper, options: _truncated_moments(lower, upper, options)[0],
-        lambda lower, upper, options: _truncated_moments(lower, upper, options)[1], CAPABILITY,
-    ),
-    Distribution(
-        "beta", "beta between the limits", _beta_quantile,
-        lambda lower, upper, options: _beta_moments(lower, upper, options)[0],
-        lambda lower, upper, options: _beta_moments(lower, upper, options)[1], {"alpha": 2.0, "beta": 2.0},
+        "beta", "beta between the limits", _beta_quantile, _beta_moments, {"alpha": 2.0, "beta": 2.0},
     ),
     # of measured values as a population: they are all there is to be drawn, so the divisor of the variance is n
     Distribution(
         "sample", "drawn from measured values", _sample_quantile,
-        lambda lower, upper, options: float(_values(options).mean()),
-        lambda lower, upper, options: float(_values(options).var()), {"values": None},
+        lambda lower, upper, options: (float(np.mean(_values(options))), float(np.var(_values(options)))),
+        {"values": None},
     ),
     Distribution(  # the limits do not matter
         "direction", "any angle with the same chance",
         lambda u, lower, upper, options: -math.pi + (math.pi - -math.pi) * np.asarray(u),
-        lambda lower, upper, options: 0.0, lambda lower, upper, options: math.pi**2 / 3,
+        lambda lower, upper, options: (0.0, math.pi**2 / 3),
     ),
 )}  # fmt: skip

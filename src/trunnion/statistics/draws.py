@@ -114,12 +114,12 @@ class Marginal:
     @property
     def mean(self) -> float:
         """Mean deviation from nominal."""
-        return self.kind.mean(self.lower, self.upper, self.options)
+        return self.kind.moments(self.lower, self.upper, self.options)[0]
 
     @property
     def deviation(self) -> float:
         """Standard deviation."""
-        return float(np.sqrt(self.kind.variance(self.lower, self.upper, self.options)))
+        return float(np.sqrt(self.kind.moments(self.lower, self.upper, self.options)[1]))
 
     def quantile(self, u: Any) -> Floats:
         """Deviation that the share u does not exceed."""

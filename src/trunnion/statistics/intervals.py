@@ -38,27 +38,25 @@ class Moments(NamedTuple):
 
 def moments_of(values: Floats) -> Moments:
     """Moments along the last axis; NaN are left out."""
-    rows = np.array([_moments_of(row[~np.isnan(row)]) for row in values.reshape(-1, values.shape[-1])])
+    rows = np.full((values.size // values.shape[-1], len(Moments._fields)), np.nan)
+    for place, row in enumerate(values.reshape(-1, values.shape[-1])):
+        present = row[~np.isnan(row)]
+        rows[place, 0] = number = len(present)
+        if not number:
+            continue
+        with np.errstate(all="ignore"):
+            mean = np.mean(present)
+            if np.isfinite(mean):
+                mean += np.mean(present - mean)  # what rounding left in it
+            apart = present - mean
+            size = np.max(np.abs(apart))
+            scaled = apart / size if size > 0.0 else apart  # so that no power leaves the range of floats
+            square = scaled * scaled
+            second, third, fourth = (np.mean(array) for array in (square, square * scaled, square * square))
+            deviation = size * np.sqrt(second * number / (number - 1)) if number > 1 else np.nan
+            shape = (third / second**1.5, fourth / second**2) if second > 0 else (np.nan, np.nan)
+        rows[place, 1:] = mean, deviation, *shape
     return Moments(*np.moveaxis(rows.reshape(*values.shape[:-1], len(Moments._fields)), -1, 0))
-
-
-def _moments_of(values: Floats) -> tuple[float, ...]:
-    number = len(values)
-    if not number:
-        return 0.0, np.nan, np.nan, np.nan, np.nan
-    with np.errstate(all="ignore"):
-        mean = np.mean(values)
-        apart = values - mean
-        if np.isfinite(mean):
-            mean += np.mean(apart)  # what rounding left in the mean
-            apart = values - mean
-        size = np.max(np.abs(apart))
-        scaled = apart / size if size > 0.0 else apart  # so that no power leaves the range of floats
-        square = scaled * scaled
-        second, third, fourth = (np.mean(array) for array in (square, square * scaled, square * square))
-        deviation = size * np.sqrt(second * number / (number - 1)) if number > 1 else np.nan
-        shape = (third / second**1.5, fourth / second**2) if second > 0 else (np.nan, np.nan)
-    return float(number), float(mean), float(deviation), *map(float, shape)
 
 
 def share(passed: Any, n: Any) -> Interval:

@@ -108,7 +108,7 @@ def test_every_result_makes_a_page_that_fetches_and_runs_nothing(name):
 def test_files_at_hand_are_hashed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "run-1.csv").write_bytes(b"t,T\n")
-    found = json.loads(trunnion.rig.compare(rocker(), measured()).attrs["files"])
+    found = json.loads(trunnion.rig.compare(rocker(), measured()).attrs["data_files"])
     assert found == [{"file": "run-1.csv", "bytes": 4, "sha256": hashlib.sha256(b"t,T\n").hexdigest()}]
 
 

@@ -12,7 +12,7 @@ of its positions are independent of each other, which the turns show (`independe
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "CAUSES", "VARIABLES", "Verdict", "causes", "compare", "data_findings", "hashed_files", "independent", "judge",
-    "other_speed", "written_unit",
+    "CAUSES", "VARIABLES", "Verdict", "causes", "compare", "independent", "judge", "of_data", "other_speed",
+    "written_unit",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -424,8 +424,7 @@ def _attributes(
     figures = [figures for row in rows for figures in row.figures.values()]
     agreed = [item["verdict"] is Verdict.WITHIN for item in figures if "verdict" in item]
     agreed += [item["efficiency_within"] == 1 for item in figures if "efficiency_within" in item]
-    drive = {"drive_unit": first.unit, "drive_span": first.span}
-    drive["drive_name"] = next(iter(mechanism.drivers), "") if first.unit != "s" else ""
+    drive = {"drive_unit": first.unit, "drive_name": next(iter(mechanism.drivers)) if first.unit != "s" else ""}
     return {
         "comparing": measurement.name,
         **origin(mechanism, first.run.system.plan.formula, **drive),
@@ -440,9 +439,7 @@ def _attributes(
         "set_units": [entry["unit"] for entry in set_entries],
         "set_written": [written_unit(entry["text"], entry["unit"]) for entry in set_entries],
         "findings": finding_rows(_findings(mechanism, list(measures), rows)),
-        "data_findings": data_findings(measurement),
-        "done": list(measurement.done),
-        "files": hashed_files(row.condition for row in rows),
+        **of_data(measurement),
         "condition_files": [list(row.condition.files) for row in rows],
         "inputs": inputs(mechanism),
     }  # fmt: skip
@@ -460,22 +457,19 @@ def written_unit(source: object, si: str) -> tuple[str, float]:
         return "", 1.0
 
 
-def data_findings(measurement: Measurement) -> list[dict[str, Any]]:
-    """What was found while the data were read, with the file."""
-    findings = gathered(measurement.findings)
-    return [{**row, "file": finding.file} for row, finding in zip(finding_rows(findings), findings, strict=True)]
-
-
-def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
-    """Name, size and SHA-256 of every file of the data; without the last two where it is not at hand."""
-    rows = []
-    for path in dict.fromkeys(Path(name) for condition in conditions for name in condition.files):
+def of_data(measurement: Measurement) -> dict[str, Any]:
+    """What a result says of its data: name, size and SHA-256 of every file, the last two where it is at hand; what was
+    found while they were read, and what was done to them."""
+    rows, findings = [], gathered(measurement.findings)
+    for path in dict.fromkeys(Path(name) for condition in measurement.conditions for name in condition.files):
         row: dict[str, Any] = {"file": path.name, "bytes": None, "sha256": ""}
         if path.is_file():
             with path.open("rb") as file:
                 row |= {"bytes": path.stat().st_size, "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
         rows.append(row)
-    return rows
+    pairs = zip(finding_rows(findings), findings, strict=True)
+    found = [{**row, "file": finding.file} for row, finding in pairs]
+    return {"data_files": rows, "data_findings": found, "done": list(measurement.done)}
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
@@ -493,8 +487,24 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
             what += f"{counted(positions, 'position')}: {code.text}"
             figures = {"count": count, "positions": positions, "status": code.text}
             findings.append(Finding.error("compare.no_answer", "", what, f"run analyse{values} to see why", **figures))
-    for name in channels:
-        findings += _of_channel(name, [row for row in rows if name in row.signals])
+    for name in channels:  # where a channel is not within U, or cannot be judged
+        judged = [(row, row.figures[name]["verdict"]) for row in rows if name in row.signals]
+        if cases := [row for row, verdict in judged if verdict in (Verdict.NOT, Verdict.OFFSET)]:
+            rms = max(row.figures[name]["rms"] for row in cases)
+            within = 100 * min(row.figures[name]["within"] for row in cases)
+            signal = cases[0].signals[name]
+            (unit, size), turning = signal.shown, signal.unit == "rad/s"  # a speed in the unit of its file
+            size_text = joined(number(rms / size, 3), unit) if turning else readable(rms, signal.unit, 3)
+            offset = " apart from a constant offset" * (Verdict.NOT not in (verdict for _, verdict in judged))
+            what = f"does not agree within U {_in_which(cases, [*judged])}{offset}: at worst {within:.0f} % of the "
+            what += f"positions agree, and the RMS of the residual is {size_text}"
+            remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
+            figures = {"within_percent": within, "rms": rms}
+            findings.append(Finding.error("compare.not_within", f"channels.{name}", what, remedy, **figures))
+        if cases := [row for row, verdict in judged if verdict in (Verdict.UNKNOWN, Verdict.NOTHING)]:
+            what = f"not compared {_in_which(cases, [*judged])}: no values of two turns, or no solution of the model"
+            remedy = "see the gaps reported by `trunnion data`"
+            findings.append(Finding.warning("compare.nothing", f"channels.{name}", what, remedy))
     cases = [row for row in rows if "efficiency" in row.figures[""]]
     if off := [row for row in cases if row.figures[""]["efficiency_within"] == 0]:
         most = max(off, key=lambda row: abs(row.figures[""]["efficiency"] - row.figures[""]["efficiency_model"]))
@@ -515,26 +525,6 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
         findings.append(Finding.note("compare.no_accuracy", "channels", f"{what}turns", remedy, channels=bare))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
-
-
-def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """Where a channel is not within U, or cannot be judged."""
-    where, verdicts = f"channels.{name}", [row.figures[name]["verdict"] for row in rows]
-    pairs = list(zip(rows, verdicts, strict=True))
-    if off := [row for row, verdict in pairs if verdict in (Verdict.NOT, Verdict.OFFSET)]:
-        rms = max(row.figures[name]["rms"] for row in off)
-        within = 100 * min(row.figures[name]["within"] for row in off)
-        unit, size = off[0].signals[name].shown  # a speed in the unit of its file
-        turning = off[0].signals[name].unit == "rad/s"
-        rms_text = joined(number(rms / size, 3), unit) if turning else readable(rms, off[0].signals[name].unit, 3)
-        offset = " apart from a constant offset" * (Verdict.NOT not in verdicts)
-        what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
-        what += f"agree, and the RMS of the residual is {rms_text}"
-        remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
-        yield Finding.error("compare.not_within", where, what, remedy, within_percent=within, rms=rms)
-    if unknown := [row for row, verdict in pairs if verdict in (Verdict.UNKNOWN, Verdict.NOTHING)]:
-        what = f"not compared {_in_which(unknown, rows)}: no values of two turns, or no solution of the model"
-        yield Finding.warning("compare.nothing", where, what, "see the gaps reported by `trunnion data`")
 
 
 def _in_which(rows: Sequence[ConditionComparison | Condition], every: Sequence[Any]) -> str:

@@ -448,7 +448,7 @@ def report(result: xr.Dataset) -> str:
     sizes = counts(*((result.sizes[dim], dim) for dim in ("condition", "channel", "position")))
     return page(
         result, "Comparison of a model with a measurement", [of_model(result), *sizes], parts,
-        summary=headline(result), signed=True, end=[data_section(result, "files")],
+        summary=headline(result), signed=True, end=[data_section(result)],
         name=str(result.attrs["comparing"]) or "Measurement", about_data=about_data(result),
     )  # fmt: skip
 
@@ -479,12 +479,12 @@ def about_data(result: xr.Dataset) -> int:
     return sum(row["severity"] != "note" for row in attribute(result, "data_findings"))
 
 
-def data_section(result: xr.Dataset, key: str) -> Section:
-    """What was done with the data, their files and the findings about them. key: of the attribute with the files."""
+def data_section(result: xr.Dataset) -> Section:
+    """What was done with the data, their files and the findings about them."""
     files = [
         [row["file"], NONE if row["bytes"] is None else f"{row['bytes']:,}".replace(",", "\u202f"),
          row["sha256"] or NONE]
-        for row in attribute(result, key)
+        for row in attribute(result, "data_files")
     ]  # fmt: skip
     table = [Table("files", ["file", "bytes", "SHA-256"], files)] if files else []
     rows = [{**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}

@@ -282,7 +282,7 @@ def report(result: xr.Dataset) -> str:
     parts += [Section("Held out", about, after=[table]) for table in residuals(result, False)]
     paths = [[row.name, ", ".join(row.paths), row.start_text] for row in rows]
     end = [
-        data_section(result, "data_files"),
+        data_section(result),
         Section("Parameters", tables=[Table("parameters", ["parameter", "paths in the model", "start"], paths)]),
     ]
     summary = []

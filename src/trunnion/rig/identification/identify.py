@@ -25,7 +25,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals, with_uncertainty
-from trunnion.rig.comparison import data_findings, hashed_files, other_speed, written_unit
+from trunnion.rig.comparison import of_data, other_speed, written_unit
 from trunnion.rig.identification.fit import (
     FAR,
     Block,
@@ -85,7 +85,6 @@ VARIABLES = {
     "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not, or if the interval is wider than the value itself"),
     "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
     "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
-    "singular_value": Variable(PARAMETER, "1", "singular value of the derivatives, columns scaled to 1; largest first"),
     "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
     "sensor_size": Variable(
         SENSOR, "of the sensor", "stated standard uncertainty, of the angle rad; NaN if it differs"
@@ -163,12 +162,12 @@ def identify(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    blocks = _blocks(measurement, channels, hold_out)
+    blocks, measures = _blocks(run, measurement, channels, hold_out)
     if follow := [seat.joint for seat in run.seats if seat.given is None]:
         what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
         raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
     phases = tuple(np.asarray(condition.phase, float) for condition in conditions)
-    sought, measures = tuple(unknowns(mechanism, paths, start or {})), _measures(mechanism, run, blocks)
+    sought = tuple(unknowns(mechanism, paths, start or {}))
     model = Model(run, sought, measures, settings, phases, friction_method or FrictionMethod())
     if channels is None:
         model = replace(model, measures=_acted_on(model))
@@ -198,10 +197,12 @@ def identify(
 # ---- the data and the model -----------------------------------------------------------------------------------
 
 
-def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: Sequence[str]) -> list[Block]:
-    """One for each channel in each condition; all channels if none is named.
+def _blocks(
+    run: Run, measurement: Measurement, channels: Sequence[str] | None, hold_out: Sequence[str]
+) -> tuple[list[Block], dict[str, Measure]]:
+    """One for each channel in each condition; all channels if none is named. What each channel measures.
 
-    hold_out: conditions by name, by a setting in it, or by file. MechanismError for what names none.
+    hold_out: conditions by name, by a setting in it, or by file. MechanismError for what names none, or has no course.
     """
     conditions, held = measurement.conditions, set[int]()
     every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
@@ -213,11 +214,8 @@ def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: 
     names_of = []
     for condition in conditions:  # spaces and signs of equality as one likes
         files = [PurePath(file) for file in condition.files]
-        names = [
-            condition.name,
-            *condition.name.split(", "),
-            *(name for file in files for name in (file.name, file.stem)),
-        ]
+        names = [condition.name, *condition.name.split(", "), *(file.name for file in files)]
+        names += [file.stem for file in files]
         names_of.append({re.sub(r"[\s=]", "", name) for name in names} - {""})
     for text in [hold_out] if isinstance(hold_out, str) else hold_out:
         named = {k for k, names in enumerate(names_of) if re.sub(r"[\s=]", "", text) in names}
@@ -228,12 +226,17 @@ def _blocks(measurement: Measurement, channels: Sequence[str] | None, hold_out: 
         held |= named
     if len(held) == len(conditions):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
-    blocks = []
+    blocks: list[Block] = []
+    measures: dict[str, Measure] = {}
     for (k, condition), channel in product(enumerate(conditions), every if channels is None else channels):
         if (signal := condition.courses.get(channel)) is not None:
             turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
             blocks.append(Block(k, channel, replace(signal, turns=turns), k in held))
-    return blocks
+            measure = measure_of(run.system.mechanism, run, channel, signal.measures, signal)
+            if measures.setdefault(channel, measure).name != measure.name:
+                what = f"measures {measures[channel].name} in one condition and {measure.name} in another"
+                raise MechanismError(Finding(what, f"channel {channel}", "use separate channels"))
+    return blocks, measures
 
 
 def _with_settings(
@@ -265,23 +268,10 @@ def _with_settings(
     return mechanism, tuple(settings)
 
 
-def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
-    """What each channel measures; MechanismError for what has no course."""
-    measures: dict[str, Measure] = {}
-    for block in blocks:
-        channel, text = block.channel, block.signal.measures
-        measure = measure_of(mechanism, run, channel, text, block.signal)
-        if measures.setdefault(channel, measure).name != measure.name:
-            what = f"measures {measures[channel].name} in one condition and {measure.name} in another"
-            raise MechanismError(Finding(what, f"channel {channel}", "use separate channels"))
-    return measures
-
-
 def _acted_on(model: Model) -> dict[str, Measure]:
     """The channels that an unknown acts on, as far as the start shows; all if there are none."""
-    courses = model.courses(model.start)
     sizes, moved = np.array([unknown.size or 1.0 for unknown in model.unknowns])[:, None], set[str]()
-    for row in courses:
+    for row in model.courses(model.start):
         for name, value in row.values.items():
             most = float(np.nanmax(np.abs(value), initial=0.0)) or 1.0
             if np.nanmax(np.abs(np.nan_to_num(row.slopes[name])) * sizes, initial=0.0) > NOTHING * most:
@@ -446,8 +436,6 @@ class _Identified:
         model, conditions, intervals = fit.model, measurement.conditions, self.intervals()
         names, system = [unknown.name for unknown in model.unknowns], model.run.system
         u, variances = intervals["standard_uncertainty"], np.array([*map(np.diagonal, spread.parts.values())])
-        rows = fit.jacobian(self.x)[:, :n]
-        singular = np.linalg.svd(rows / (np.linalg.norm(rows, axis=0) + (rows == 0).all(axis=0)), compute_uv=False)
         sizes = [{abs(error.angle)} if error.angle else set(error.sizes[error.sizes != 0]) for error in fit.sensors]
         arrays = {
             **self.by_block,
@@ -457,7 +445,6 @@ class _Identified:
             "told": (~self.lost & ~self.vague)[:n].astype(np.int8),
             "correlation": np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0),
             "share": np.where(self.lost[:n, None], np.nan, (variances / np.sum(variances, axis=0))[:, :n].T),
-            "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
             "sensor_error": np.where(self.lost, np.nan, self.x)[n:],
             "sensor_uncertainty": u[n:],
             "sensor_size": np.array([size.pop() if len(size) == 1 else np.nan for size in sizes]),
@@ -487,9 +474,7 @@ class _Identified:
             # angles of the first driver where the cycle begins and ends, rad; None if they name no position
             "drive_range": [list(pair) if np.isfinite(pair).all() else None for pair in ends],
             "files": [list(condition.files) for condition in conditions],
-            "data_files": hashed_files(conditions),
-            "data_findings": data_findings(measurement),
-            "done": list(measurement.done),
+            **of_data(measurement),
             "inputs": inputs(mechanism),
             "evaluations": fit.evaluate.cache_info().misses,
             "converged": int(self.solution.converged),
@@ -509,10 +494,6 @@ class _Identified:
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
-
-
-def _joined(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _of_fit(identified: _Identified) -> Iterator[Finding]:
@@ -564,7 +545,7 @@ def _of_unknowns(identified: _Identified) -> Iterator[Finding]:
               if shared_zero(accuracy) or accuracy.gain}  # fmt: skip
     channels = dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)
     if bare := [name for name in channels if name not in stated and not fit.model.measures[name].of_motion]:
-        what = f"no accuracy is stated for {_joined(bare)}: zero and gain count as exact, and the intervals are too "
+        what = f"no accuracy is stated for {', '.join(bare)}: zero and gain count as exact, and the intervals are too "
         remedy = "state accuracy: {zero: …, gain: …} in the mapping"
         yield Finding.warning("sensor.no_accuracy", "sensors", f"{what}narrow", remedy)
     for s, sensor in enumerate(fit.sensors) if not identified.spread.test.gross else ():
@@ -578,11 +559,8 @@ def _of_unknowns(identified: _Identified) -> Iterator[Finding]:
     every = [*(unknown.name for unknown in fit.model.unknowns), *(f"the {error.name}" for error in fit.sensors)]
     for group in identified.groups:
         names = [every[i] for i in group]
-        what = f"{names[0]} is not identifiable: it has no effect on {_joined([*channels])}"
-        if len(names) > 1:
-            what = (
-                f"{_joined(names)} are not separately identifiable: they have the same effect on {_joined([*channels])}"
-            )
+        what = "is not identifiable: it has no effect on" if len(names) == 1 else "are not separately identifiable: "
+        what = f"{' and '.join(names)} {what}{'they have the same effect on' * (len(names) > 1)} {', '.join(channels)}"
         remedy = "fix one or more, or measure a quantity that tells them"
         yield Finding.warning("parameter.not_told_apart", f"parameter {names[0]}", what, remedy, names=names)
     for p, unknown in enumerate(fit.model.unknowns) if not identified.refuted else ():

@@ -108,15 +108,23 @@ class Model:
             alike = [k for k, item in enumerate(sizes) if item == size]
             most = max(1, AT_ONCE // (size * many))
             for part in (alike[low : low + most] for low in range(0, len(alike), most)):
-                shape = (len(part) * many, size)
-                values, time = self._values(part, at), self._times(part, at)
+                shape, values = (len(part) * many, size), self._values(part, at)
+                # shares of a cycle that an unknown may make longer, (row, position), s
+                phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
+                duration = np.repeat([self.cycle(k, at).duration for k in part], many)[:, None]
+                slope, time = np.zeros((len(part), many)), phase * duration
+                for p in self._timing:
+                    step = STEP * (abs(at[p]) or 1.0) * (np.arange(many) == p)
+                    ends = [[self.cycle(k, at + sign * step).duration for k in part] for sign in (-1, 1)]
+                    slope[:, p] = np.diff(ends, axis=0)[0] / (2 * step[p])
+                lasts: Number = Dual(time, phase * slope.reshape(-1, 1)) if self._timing else time
                 solved: Forward | Backward
                 with np.errstate(all="ignore"):
                     if all(measure.of_motion for measure in self.measures.values()):
-                        solved = posed(self.run.system, values, self.run.chosen.assembly, time)
+                        solved = posed(self.run.system, values, self.run.chosen.assembly, lasts)
                         status, sides = pose_status(solved, shape), np.zeros(shape, bool)
                     else:
-                        solved = self.run.solve(time, values, self.friction)
+                        solved = self.run.solve(lasts, values, self.friction)
                         status, sides = status_of(solved, shape), turned(self.run, solved.walk, shape)
                     curves = {name: measure.curve(solved)[0] for name, measure in self.measures.items()}
                 reals, slopes = ({name: np.broadcast_to(np.asarray(of(curve), float), shape)
@@ -189,18 +197,6 @@ class Model:
             if play is not None:
                 values.update(play.model.paths(f"seats.{seat.joint}", shifts.given_offsets(values, seat.joint, play)))
         return values
-
-    def _times(self, part: Sequence[int], at: Array) -> Number:
-        """Times of the positions, s, (row, position): shares of a cycle that an unknown may make longer."""
-        many = len(self.unknowns)
-        phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
-        duration, slope = np.array([self.cycle(k, at).duration for k in part]), np.zeros((len(part), many))
-        for p in self._timing:
-            step = STEP * (abs(at[p]) or 1.0) * (np.arange(many) == p)
-            ends = [[self.cycle(k, at + sign * step).duration for k in part] for sign in (-1, 1)]
-            slope[:, p] = np.diff(ends, axis=0)[0] / (2 * step[p])
-        time = phase * np.repeat(duration, many)[:, None]
-        return Dual(time, phase * slope.reshape(-1, 1)) if self._timing else time
 
     @cached_property
     def _timing(self) -> list[int]:

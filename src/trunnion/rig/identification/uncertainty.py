@@ -106,7 +106,14 @@ def spread_of(fit: Fit, x: Array) -> Covariances:
     null = (vectors[:, lost] / size[:, None]).T
     # what a deviation at each position does to the estimates, (unknown and sensor, position), by block
     pulls = {k: inverse @ (np.nan_to_num(fit.reading(x, k)[1]) * fit.weight(k)) for k in fit.fitted}
-    steps = {k: _steps(fit, x, k, pull) for k, pull in pulls.items()}
+    steps = {}  # covariance by readings that stick to steps: of a mean that does not get finer by more turns
+    for k, pull in pulls.items():
+        signal = fit.blocks[k].signal
+        step, left = signal.accuracy.resolution, signal.accuracy.left
+        if left is not None and left.every and signal.unresolved:
+            steps[k] = covariance_of_steps(pull, np.nan_to_num(fit.reading(x, k)[0]) / step, left) * step**2
+        else:
+            steps[k] = np.asarray(pull @ pull.T * fit.blocks[k].unresolved ** 2)
     scatter, freedom, follows, by_condition = _between_turns(fit, pulls, steps)
     apart, test = _apart(fit, x, pulls, by_condition), lack_of_fit(fit, x)
     single, pieces = _left_over(fit, x, pulls, repeats=False)
@@ -132,15 +139,6 @@ def spread_of(fit: Fit, x: Array) -> Covariances:
         below = sum(np.diagonal(part) ** 2 / free for part, free in random)
         freedom = np.where(below > 0, total**2 / below, np.inf)
     return Covariances(inverse, null, parts, freedom, test, follows, apart, excess)
-
-
-def _steps(fit: Fit, x: Array, k: int, pull: Array) -> Array:
-    """Covariance by readings of a block that stick to steps: of a mean that does not get finer by more turns."""
-    block = fit.blocks[k]
-    step, left = block.signal.accuracy.resolution, block.signal.accuracy.left
-    if left is not None and left.every and block.signal.unresolved:
-        return covariance_of_steps(pull, np.nan_to_num(fit.reading(x, k)[0]) / step, left) * step**2
-    return np.asarray(pull @ pull.T * block.unresolved**2)
 
 
 def _between_turns(

@@ -262,7 +262,7 @@ TOLD: list[tuple[dict[str, Any], set[str], str]] = [
     ({"angle/sign": -1, "channels/torque-in/zero": "50 mV"}, {"data.rate.ratio"}, "-600 rpm, -1 times"),
     ({"angle/index": {"column": "none"}}, {"data.index.none"}, "has no pulse"),
     ({"angle/index": {"column": "z"}, "angle/per_turn": 59}, {"data.pulses.lost"}, "usual are 60 a turn"),
-    ({"angle": {"from": "column", "column": "angle [°]", "unit": "rad"}}, {"data.unit.differs"}, "57.3 times"),
+    ({"angle": {"from": "column", "column": "angle [°]", "unit": "rad"}}, {"data.unit.differs"}, "the mapping 'rad'"),
     ({"angle": {"from": "column", "column": "angle [°]", "unit": "deg"}}, set(), ""),
 ]
 

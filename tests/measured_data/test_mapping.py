@@ -90,7 +90,7 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"angle": {"from": "column", "column": "a", "per_turn": 60}}, "angle", "does not use per_turn"),
     ({"angle": {"from": "time", "speed": 0}}, "angle", "the speed is zero"),
     ({"time": {"column": "t", "rate": "1 kHz"}}, "time", "either a column or a rate"),
-    ({"time": {"rate": "0 Hz"}}, "time.rate", "not a frequency above zero"),
+    ({"time": {"rate": "0 Hz"}}, "time.rate", "0 Hz is not above zero"),
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
     ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a.column", "unknown"),
     ({"set": {"a": "2 * AB"}}, "set.a", "'* AB' is not known"),

@@ -94,13 +94,13 @@ def test_gaps_and_single_turns() -> None:
     turns = exact(4)
     turns["T1"][1, 5] = turns["n2"][2, 7] = np.nan  # where power in and out are not those of the mean
     found = efficiency_of(condition(turns))
-    assert (found.turns, found.left_out) == (4, 0)
+    assert (len(found.per_turn), found.left_out) == (4, 0)
     assert found.value == pytest.approx(ETA, rel=1e-12)
     assert found.per_turn == pytest.approx([ETA] * 4, rel=1e-12)
     assert np.isfinite(found.uncertainty)
     turns["T1"][1, 5:9] = np.nan
     found = efficiency_of(condition(turns))
-    assert (found.turns, found.left_out) == (3, 1)
+    assert (len(found.per_turn), found.left_out) == (3, 1)
     assert found.value == pytest.approx(ETA)
     single = efficiency_of(condition(exact(1)))
     assert single.value == pytest.approx(ETA)

@@ -60,7 +60,7 @@ sensors:
     ("old", "new", "line", "what", "remedy"),
     [
         ("turns: 2", "turrns: 2", 2, "the key 'turrns' is unknown", "'turns'"),
-        ("1 kHz", "1 kg", 3, "'1 kg' is not a frequency", "2 kHz"),
+        ("1 kHz", "1 kg", 3, "the unit 'kg' is not a frequency", "2 kHz"),
         ("1 kHz", "fast", 3, "not a number", "12.5 mV"),
         ("per_turn: 60", "per_turn: 0", 4, "greater than or equal to 1", ""),
         ("trunnion-rig: 1", "trunnion-rig: 2", 1, "version 2", "trunnion-rig: 1"),

@@ -23,7 +23,7 @@ from trunnion.rig.virtual.rig_file import (
 
 
 def channel(si: str = "N m", **stated: object) -> SensorChannel:
-    return resolved("s", Sensor(**{"measures": "effort:A", **stated}), "s", si)
+    return resolved("s", Sensor(**{"measures": "effort:A", **stated}), si)
 
 
 @pytest.mark.parametrize("given", ["100 mV/(N m)", "0.01 N m/mV", "10 N m/V"])

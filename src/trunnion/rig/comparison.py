@@ -289,7 +289,7 @@ def _efficiency(
     try:
         measured = efficiency_of(condition, joints)
         value, half = measured.value, measured.factor(coverage) * measured.uncertainty
-        if measured.turns < 2:
+        if len(measured.per_turn) < 2:
             doubt = "there is only one turn: the uncertainty cannot be estimated without scatter", "measure more turns"
         elif half > VAGUE or value > 1 + half:
             doubt = f"{value:.4f} ± {half:.3g} is no efficiency", "check sign, gain, unit and column of its channels"

@@ -19,7 +19,7 @@ from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import DataTable
 from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, missing, unit_of, warning
 
-__all__ = ["Coordinate", "Pulses", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
+__all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 
 Array = NDArray[np.float64]
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which pulses are smoothed, the longest first
@@ -61,7 +61,17 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, say: Say) 
         angle = _of_pulses(source, readings, line, index, say)
     elif column is not None:
         values = joined(readings * unit_of("angle", str(source.column), column, source.unit, "rad", say)[1])
-        angle = Coordinate(values) if source.resolution is None else _in_steps(values, source.resolution.value, line)
+        angle, finite = Coordinate(values), np.flatnonzero(np.isfinite(values))
+        if source.resolution is not None and finite.size >= FEWEST:
+            # read in steps, between them as the shaft turns, and cut off to them or not
+            raw, seconds, step = values[finite], line.seconds[finite], source.resolution.value
+            passed, lasted = np.abs(np.diff(raw)), np.diff(seconds)
+            turning = passed / lasted > 0.1 * np.mean(passed / lasted)
+            rate = float(np.sum(passed[turning]) / max(np.sum(lasted[turning]), 1e-300)) or 1.0
+            refined, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
+            values[finite] = refined
+            lag = unresolved((raw - refined)[spans > 0], step) / rate
+            angle = Coordinate(values, NOWHERE, lag, step / math.sqrt(12.0))
     else:
         assert source.speed is not None
         angle = Coordinate(source.speed.value * line.seconds)
@@ -73,43 +83,29 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, say: Say) 
 # ---- pulses ---------------------------------------------------------------------------------------------------
 
 
-class Pulses(NamedTuple):
-    """Times at which counts were reached, (pulse,), each to a sample."""
-
-    times: Array
-    counts: Array
-
-    def slack(self, step: float) -> float:
-        """Counts from one sample to the next, in the mean while the shaft turns.
-
-        The median would be 1 of 1.2: most samples then count on by one, some by two.
-        """
-        counts, times = np.abs(np.diff(self.counts)), np.diff(self.times)
-        each = times / np.maximum(counts, 0.5)
-        turning = each < STANDS * np.median(each)
-        return step * float(np.sum(counts[turning]) / np.sum(times[turning]))
-
-
 def _of_pulses(source: AngleSource, readings: Array, line: Timeline, index: Array, say: Say) -> Coordinate:
     """The angle between pulses by interpolation in time, counted anew from every index pulse."""
     assert source.per_turn is not None
-    finite = np.isfinite(readings)
-    pulses = _counted(source, readings[finite], line.seconds[finite], line.step)
-    if pulses.times.size < 2:
-        what = f"the column '{source.column}' has {counted(pulses.times.size, 'pulse')}: there are no turns"
+    finite, spoilt, step, pitch = np.isfinite(readings), NOWHERE, line.step, TURN / source.per_turn
+    when, counts = _counted(source, readings[finite], line.seconds[finite], step)
+    if when.size < 2:
+        what = f"the column '{source.column}' has {counted(when.size, 'pulse')}: there are no turns"
         raise MechanismError(Finding(what, "angle", "check that angle.column is the encoder's count"))
-    (when, counts), spoilt, step = pulses, NOWHERE, line.step
-    slack, pitch = pulses.slack(step), TURN / source.per_turn
+    # counts from one sample to the next while the shaft turns, in the mean: the median would be 1 of 1.2
+    passed, lasted = np.abs(np.diff(counts)), np.diff(when)
+    each = lasted / np.maximum(passed, 0.5)
+    turning = each < STANDS * np.median(each)
+    slack, times = step * float(np.sum(passed[turning]) / np.sum(lasted[turning])), when
     if index.size > 1:
         at = np.interp(index[[0, -1]], when, counts)
         index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, step)
-        counts, spoilt = _by_index(pulses, index, source.per_turn, step, say)
+        counts, spoilt = _by_index(when, counts, slack, index, source.per_turn, say)
     elif index.size == 1:
         counts = counts - np.interp(index[0], when, counts)
     angles = pitch * counts
     if slack < 1:  # a count for each event: its time is not known
         when, spans = smoothed(when, 0.5 * step, source.per_turn, counts)
-        lag = unresolved((pulses.times - when)[spans > 0], step)
+        lag = unresolved((times - when)[spans > 0], step)
     else:  # an event for each sample: its count is not known
         raw = angles
         angles, spans = smoothed(raw, pitch * min(0.5 * slack, 0.5), source.per_turn / slack, when)
@@ -118,14 +114,15 @@ def _of_pulses(source: AngleSource, readings: Array, line: Timeline, index: Arra
     return Coordinate(np.interp(line.seconds, when, angles, left=np.nan, right=np.nan), spoilt, lag)
 
 
-def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> Pulses:
-    """The rows where the count changes; the edge lies between two samples, its time is taken in the middle.
+def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> tuple[Array, Array]:
+    """Times at which counts were reached, (pulse,), each to a sample, and the counts: the rows where the count changes.
 
-    From a to b it passes b if it counts on by one; if it jumps, half way the count is (a + b + 1)/2 in the mean. It
-    goes on where its counter is full, at `wrap`; MechanismError for one that is set back otherwise.
+    The edge lies between two samples, its time is taken in the middle. From a to b it passes b if it counts on by one;
+    if it jumps, half way the count is (a + b + 1)/2 in the mean. It goes on where its counter is full, at `wrap`;
+    MechanismError for one that is set back otherwise.
     """
     if readings.size < 2:
-        return Pulses(np.empty(0), np.empty(0))
+        return np.empty(0), np.empty(0)
     counts = readings if source.wrap is None else np.unwrap(readings, period=float(source.wrap))
     steps = np.diff(counts)
     rising = steps * (float(np.sign(np.sum(np.sign(steps)))) or 1.0)
@@ -137,7 +134,7 @@ def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) 
         raise MechanismError(Finding(what, "angle", "state wrap: the count at which the counter returns to 0"))
     at = np.flatnonzero(steps != 0)
     at = at[np.diff(seconds)[at] <= GAP * step]
-    return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (counts[at] + counts[at + 1] + 1.0))
+    return 0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (counts[at] + counts[at + 1] + 1.0)
 
 
 def _edges(readings: Array, line: Timeline) -> Array:
@@ -157,18 +154,18 @@ def _edges(readings: Array, line: Timeline) -> Array:
     return np.asarray(line.seconds[before] + share * (line.seconds[after] - line.seconds[before]))
 
 
-def _by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:
+def _by_index(times: Array, counts: Array, slack: float, index: Array, per_turn: int, say: Say) -> tuple[Array, Array]:
     """Counts from the first index pulse, set right at each; times of the turns in which pulses were lost.
 
     With few samples a pulse the count at an index is known to about one: then its median over nine turns is taken.
     """
-    at = np.interp(index, pulses.times, pulses.counts)
+    at = np.interp(index, times, counts)
     sense = np.sign(at[-1] - at[0]) or 1.0
     between = np.diff(at) * sense
     over = (at - at[0]) * sense - per_turn * np.cumsum([0.0, *np.maximum(np.rint(between / per_turn), 1.0)])
     fraction = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
     level = over - fraction
-    if pulses.slack(step) > 0.25 and level.size >= 9:
+    if slack > 0.25 and level.size >= 9:
         level = median_filter(level, size=9, mode="nearest")
     level = np.rint(level)
     change = np.diff(level)
@@ -179,9 +176,9 @@ def _by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say
         what += f"{counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}; "
         what += f"corrected at the index, these turns are left out; usual are {np.median(between):.4g} a turn"
         say(warning("pulses.lost", "angle", what, "check encoder, cable and counter, and per_turn"))
-    turn = np.clip(np.searchsorted(index, pulses.times, side="right") - 1, 0, index.size - 1)
+    turn = np.clip(np.searchsorted(index, times, side="right") - 1, 0, index.size - 1)
     spoilt = np.column_stack([index[:-1][wrong], index[1:][wrong]])
-    return pulses.counts - at[0] - sense * fraction - sense * level[turn], spoilt
+    return counts - at[0] - sense * fraction - sense * level[turn], spoilt
 
 
 def seen_edges(index: Array, turns: float, step: float) -> Array:
@@ -195,19 +192,6 @@ def seen_edges(index: Array, turns: float, step: float) -> Array:
 
 
 # ---- smoothing ------------------------------------------------------------------------------------------------
-
-
-def _in_steps(values: Array, step: float, line: Timeline) -> Coordinate:
-    """An angle that is read in steps, between them as the shaft turns, and cut off to them or not."""
-    finite, refined, cut = np.flatnonzero(np.isfinite(values)), values.copy(), step / math.sqrt(12.0)
-    if finite.size < FEWEST:
-        return Coordinate(values)
-    raw, seconds = values[finite], line.seconds[finite]
-    passed, lasted = np.abs(np.diff(raw)), np.diff(seconds)
-    turning = passed / lasted > 0.1 * np.mean(passed / lasted)
-    rate = float(np.sum(passed[turning]) / max(np.sum(lasted[turning]), 1e-300)) or 1.0
-    refined[finite], spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
-    return Coordinate(refined, NOWHERE, unresolved((raw - refined[finite])[spans > 0], step) / rate, cut)
 
 
 def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -311,20 +312,15 @@ def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
         remedy = "add angle: {from: …}, or write cycle: as a time"
         yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
     for k, file in enumerate(mapping.files):
-        if not _inside(file.file, folder):
+        inside = False  # the mapping is data from a stranger, and so are links beside it
+        with suppress(OSError, ValueError, RuntimeError):
+            inside = (folder / file.file).resolve().is_relative_to(folder.resolve())
+        if not inside or Path(file.file).is_absolute():
             what = f"'{file.file[:80]}' is not below the folder of the mapping"
             yield Finding(what, f"files.{k}.file", "put it there, or name it on the command line")
         if file.angle is not None and angle is None:
             what = "states a zero of the angle, but no column gives an angle"
             yield Finding(what, f"files.{k}.angle", "add angle: {from: …}, or remove it")
-
-
-def _inside(name: str, folder: Path) -> bool:
-    """Whether a file lies below a folder: the mapping is data from a stranger, and so are links beside it."""
-    try:
-        return not Path(name).is_absolute() and (folder / name).resolve().is_relative_to(folder.resolve())
-    except (OSError, ValueError, RuntimeError):
-        return False
 
 
 def schema_text() -> str:

@@ -35,7 +35,7 @@ VARIABLES = {
     "mean": Variable(COURSE, "channel", "mean over the turns"),
     "scatter": Variable(COURSE, "channel", "standard deviation between turns"),
     "uncertainty": Variable(COURSE, "channel", "its standard uncertainty"),
-    "turns": Variable(COURSE, "1", "turns with a value at the position"),
+    "turns": Variable(COURSE, "1", "turns with a value at the position", np.intp),
     "set": Variable(("condition", "setting"), "SI", "what was set"),
     "speed": Variable(("condition",), "rad/s", "mean speed of the driver"),
     "phase": Variable(("position",), "1", "share of the cycle"),
@@ -98,11 +98,6 @@ class Signal:
             warnings.simplefilter("ignore", RuntimeWarning)
             return np.asarray(np.nanmean(self.turns, axis=0))
 
-    @property
-    def read(self) -> Array:
-        """Mean of what the sensor reads, in the unit of the course, (position,): on which an error of its gain acts."""
-        return self.mean - self.accuracy.datum
-
     @cached_property
     def scatter(self) -> Array:
         """Standard deviation between turns, (position,); NaN with fewer than two."""
@@ -130,7 +125,8 @@ class Signal:
         zero = np.full_like(self.mean, np.hypot(self.accuracy.zero, self.accuracy.cut))
         random = self.scatter / np.sqrt(np.maximum(self.count, 1))
         local = np.hypot(np.full_like(random, self.unresolved), self.local)
-        shared = np.array([zero, self.accuracy.gain * self.read, np.broadcast_to(angle, zero.shape)])
+        gain = self.accuracy.gain * (self.mean - self.accuracy.datum)  # of what the sensor reads
+        shared = np.array([zero, gain, np.broadcast_to(angle, zero.shape)])
         return Uncertainty(random, local, shared, self.count, self.turns - self.mean)
 
 
@@ -245,17 +241,16 @@ def dataset(measurement: Measurement) -> xr.Dataset:
     conditions, first = measurement.conditions, measurement.channels
     channels, phase = list(first), max((condition.phase for condition in conditions), key=len)
     names = list(dict.fromkeys(name for condition in conditions for name in condition.values))
-    size = len(conditions), len(channels), len(phase)
-    arrays: dict[str, NDArray[Any]] = {key: np.full(size, np.nan) for key in ("mean", "scatter", "uncertainty")}
-    arrays["turns"] = np.zeros(size, dtype=np.intp)
+    sizes = {"condition": len(conditions), "channel": len(channels), "position": len(phase), "setting": len(names)}
+    arrays: dict[str, NDArray[Any]] = {name: variable.blank(sizes) for name, variable in VARIABLES.items()}
+    arrays["phase"][:] = phase
     for i, condition in enumerate(conditions):
+        arrays["speed"][i] = condition.speed
+        arrays["set"][i] = [condition.values.get(name, np.nan) for name in names]
         for channel, course in condition.courses.items():
-            rows = {"mean": course.mean, "scatter": course.scatter, "uncertainty": course.uncertainty}
-            for key, row in (rows | {"turns": course.count}).items():
-                arrays[key][i, channels.index(channel), : len(row)] = row
-    values = [[condition.values.get(name, np.nan) for name in names] for condition in conditions]
-    arrays["set"] = np.array(values).reshape(len(conditions), len(names))
-    arrays["speed"] = np.array([condition.speed for condition in conditions])
+            at = i, channels.index(channel), slice(0, len(condition.phase))
+            arrays["mean"][at], arrays["scatter"][at] = course.mean, course.scatter
+            arrays["uncertainty"][at], arrays["turns"][at] = course.uncertainty, course.count
     units = {"channel": MemberUnits("channel", [first[name].unit for name in channels])}
     labels = {"condition": [condition.name for condition in conditions], "channel": channels, "setting": names}
     attributes = {
@@ -264,8 +259,8 @@ def dataset(measurement: Measurement) -> xr.Dataset:
         "done": list(measurement.done),
         "findings": finding_rows(measurement.findings),
     }
-    variables, coordinates = described(arrays, VARIABLES, units), described({"phase": phase}, VARIABLES)
-    return dataset_of("measurement", variables, labels, attributes, coordinates)
+    along = described({"phase": arrays.pop("phase")}, VARIABLES)
+    return dataset_of("measurement", described(arrays, VARIABLES, units), labels, attributes, along)
 
 
 # ---- efficiency ------------------------------------------------------------------------------------------------
@@ -322,7 +317,7 @@ class Efficiency:
         scatter = sum(part.effect for part in self.contributions if part.source == "repeatability")
         share = self.uncertainty / scatter if scatter > 0 else float("inf")
         square = share * share  # not a power: near the end of the floats that is an error
-        return (self.turns - 1) * square * square if scatter > 0 else float("inf")
+        return (len(self.per_turn) - 1) * square * square if scatter > 0 else float("inf")
 
     def factor(self, coverage: float = COVERAGE) -> float:
         """k of U = k u: Student's for the freedom, with the probability that `coverage` has of a normal one."""
@@ -332,11 +327,6 @@ class Efficiency:
     def expanded(self) -> float:
         """U = k u with k for 95.45 %."""
         return self.factor() * self.uncertainty
-
-    @property
-    def turns(self) -> int:
-        """Whole turns that it is made of."""
-        return len(self.per_turn)
 
     def __str__(self) -> str:
         return f"η = {self.value:.4f} ± {self.expanded:#.2g} (k = {self.factor():.2g})"

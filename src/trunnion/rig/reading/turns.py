@@ -24,7 +24,7 @@ from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.model.units import UnitError, normalise
 from trunnion.rig.reading.mapping import TimeBase
 from trunnion.rig.reading.tables import Column, DataTable
-from trunnion.rig.reading.units import HERTZ, alike, dimensions
+from trunnion.rig.reading.units import alike, dimensions
 
 __all__ = [
     "DENSE", "GAP", "TURN", "LeftOfSteps", "Say", "Timeline", "Turns", "at_times", "counted", "covariance_of_steps",
@@ -103,10 +103,9 @@ def _rising(seconds: Array, say: Say) -> Timeline:
         raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
     clean, back = seconds[rising], np.diff(clock) < 0
     if rising.size < seconds.size:
-        what = (
-            f"{counted(seconds.size - rising.size, 'row')} of {seconds.size:,} left out: {np.sum(~finite):,} have no "
-        )
-        what += f"time, of the others it does not rise, {at_times(highest[finite & ~rises])}"
+        left_out = f"{counted(seconds.size - rising.size, 'row')} of {seconds.size:,} left out"
+        what = f"{left_out}: {np.sum(~finite):,} have no time, of the others it does not rise, "
+        what += at_times(highest[finite & ~rises])
         if back.any():
             what += f"; it runs backward {counted(int(back.sum()), 'time')} by up to {-np.diff(clock).min():.4g} s"
         say(warning("time.backward", "time", what, "check the logger's clock, or split the file"))
@@ -132,9 +131,8 @@ def unit_of(where: str, name: str, column: Column, in_mapping: str | None, usual
     in_file = "rpm" if usual == "rad/s" and _PER_MINUTE.fullmatch(normalise(column.unit).strip()) else column.unit
     unit = in_mapping or in_file or usual
     if usual and not (in_mapping or in_file):
-        say(
-            note("unit.none", where, f"the column '{name}' has no unit; SI is assumed ({usual})", f"state {where}.unit")
-        )
+        what = f"the column '{name}' has no unit; SI is assumed ({usual})"
+        say(note("unit.none", where, what, f"state {where}.unit"))
     try:
         factor, kind = dimensions(unit) if unit else (1.0, {})
     except UnitError as error:
@@ -144,12 +142,9 @@ def unit_of(where: str, name: str, column: Column, in_mapping: str | None, usual
         what = f"the column '{name}' has the unit '{unit}', which is no {where}"
         raise MechanismError(Finding(what, where, "name another column"))
     with suppress(UnitError):
-        size, of_file = dimensions(in_file if in_mapping and in_file else unit) if unit else (1.0, {})
-        if of_file == HERTZ and "rad" in kind:  # 1/min in the heading, rpm in the mapping
-            size, of_file = min((size, 2 * np.pi * size), key=lambda turns: abs(turns - factor)), kind
+        size, of_file = dimensions(in_file) if in_mapping and in_file else (factor, kind)
         if not (alike(of_file, kind) and np.isclose(size, factor, rtol=1e-12, atol=0)):
-            times = f": all values are {factor / size:.3g} times those of the file" if alike(of_file, kind) else ""
-            what = f"the file has the unit '{in_file}' for '{name}', the mapping '{in_mapping}', which is taken{times}"
+            what = f"the file has the unit '{in_file}' for '{name}', the mapping '{in_mapping}', which is taken"
             say(warning("unit.differs", where, what, f"correct {where}.unit, or remove it"))
     return unit, factor
 
@@ -286,24 +281,17 @@ def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Arr
         slack = min(line.step, 0.25 * (stop - start))  # an index may lie where a turn begins
         good &= (begin > stop - slack) | (end < start + slack)
     begin, end = begin[good], end[good]
-    rows = _rows_of(share, begin, end, line, allowed, positions)
+    rows = np.zeros(share.size, dtype=np.bool_)
+    if begin.size:  # rows within turns, half a position before and after included, that move
+        usual = float(np.median(end - begin))
+        margin, wide = 0.5 * usual / positions + line.step, max(int(usual / line.step / 100), 1)
+        level = np.zeros(share.size + 1, dtype=np.int64)
+        np.add.at(level, np.searchsorted(line.seconds, begin - margin), 1)
+        np.add.at(level, np.searchsorted(line.seconds, end + margin, side="right"), -1)
+        speed, lasts = np.full(share.size, np.inf), line.seconds[2 * wide :] - line.seconds[: -2 * wide]
+        speed[wide:-wide] = (share[2 * wide :] - share[: -2 * wide]) / lasts
+        rows = (np.cumsum(level[:-1]) > 0) & np.isfinite(share) & allowed & ~(speed < STANDING / usual)
     return Turns(share, numbers[good], begin, end, rows, positions, line)
-
-
-def _rows_of(share: Array, begin: Array, end: Array, line: Timeline, allowed: Mask, positions: int) -> Mask:
-    """Rows within turns, half a position before and after included, that move."""
-    if not begin.size:
-        return np.zeros(share.size, dtype=np.bool_)
-    usual = float(np.median(end - begin))
-    margin = 0.5 * usual / positions + line.step
-    level = np.zeros(share.size + 1, dtype=np.int64)
-    np.add.at(level, np.searchsorted(line.seconds, begin - margin), 1)
-    np.add.at(level, np.searchsorted(line.seconds, end + margin, side="right"), -1)
-    wide = max(int(usual / line.step / 100), 1)
-    speed = np.full(share.size, np.inf)
-    lasts = line.seconds[2 * wide :] - line.seconds[: -2 * wide]
-    speed[wide:-wide] = (share[2 * wide :] - share[: -2 * wide]) / lasts
-    return np.asarray((np.cumsum(level[:-1]) > 0) & np.isfinite(share) & allowed & ~(speed < STANDING / usual))
 
 
 def joined(angle: Array) -> Array:

@@ -48,7 +48,7 @@ class Amount:
         return not self.unit
 
 
-ZERO = Amount(0.0, 0.0, "", {})
+ZERO, ONE = Amount(0.0, 0.0, "", {}), Amount(1.0, 1.0, "", {})
 
 
 def dimensions(text: str) -> tuple[float, Dimensions]:
@@ -90,7 +90,7 @@ def alike(first: Dimensions, second: Dimensions) -> bool:
     if first == second:
         return True
     bare = [{key: power for key, power in each.items() if key != "rad"} for each in (first, second)]
-    return bare[0] == bare[1] and bool(bare[0]) and bare[0] != dict(HERTZ)
+    return bare[0] == bare[1] and bool(bare[0]) and bare[0] != HERTZ
 
 
 def multiplied(first: Dimensions, second: Dimensions, sign: int = 1) -> Dimensions:
@@ -101,7 +101,7 @@ def multiplied(first: Dimensions, second: Dimensions, sign: int = 1) -> Dimensio
 def unit_name(exponents: Dimensions) -> str:
     """SI unit of dimensions, in short."""
     exponents = {key: power for key, power in exponents.items() if power}
-    if exponents == dict(VOLT):
+    if exponents == VOLT:
         return "V"
     if exponents.keys() <= set(BASES[:4]):
         length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in BASES[:4])
@@ -137,28 +137,21 @@ def _in(si: str, example: str) -> AfterValidator:
     def check(entry: Amount | str) -> Amount | str:
         text = entry.unit if isinstance(entry, Amount) else entry
         if text and not alike(dimensions(text)[1], dimensions(si)[1] if si else {}):
-            what = f"the unit '{text}' is not {example.split(' such')[0]}"
-            raise problem(what, f"write {example}")
+            raise problem(f"the unit '{text}' is not {example.split(' such')[0]}", f"write {example}")
         return entry
 
     return AfterValidator(check)
 
 
-def _bounded(above: bool) -> AfterValidator:
-    """Amounts above zero, or else not below it."""
-
-    def check(amount: Amount) -> Amount:
-        if not (amount.value > 0 if above else amount.value >= 0):
-            remedy = "write a number above it, such as 100 N m or 0.1 deg" if above else "write it without a sign"
-            raise problem(f"{amount.source} is {'not above' if above else 'below'} zero", remedy)
-        return amount
-
-    return AfterValidator(check)
+def _above(amount: Amount) -> Amount:
+    if not amount.value > 0:
+        raise problem(f"{amount.source} is not above zero", "write a number above it, such as 100 N m or 0.1 deg")
+    return amount
 
 
-def _hertz(amount: Amount) -> Amount:
-    if not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
-        raise problem(f"'{amount.source}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")
+def _size(amount: Amount) -> Amount:
+    if not amount.value >= 0:
+        raise problem(f"{amount.source} is below zero", "write it without a sign")
     return amount
 
 
@@ -166,29 +159,24 @@ def _measures(text: str) -> str:
     """A measure that has a course: KIND:NAME, link.point.x or the name of one of the model."""
     kind, (_, colon, subject) = _kind(text), text.partition(":")
     if (kind and kind not in QUANTITIES) or (colon and not subject.strip()) or not text.strip():
-        near = nearest(kind, QUANTITIES)
-        remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
+        near, remedy = nearest(kind, QUANTITIES), "write effort:DRIVER, rate:JOINT, load:LOAD or link.point.x"
         what = f"'{text[:80]}' is not a quantity that a sensor measures"
         raise problem(what, near if near.startswith("did") else remedy)
     return text
 
 
-def _schema(example: str) -> WithJsonSchema:
-    return WithJsonSchema({"type": ["number", "string"], "examples": [example]})
-
-
-_READ, _SOURCE = _entry(read_amount), PlainSerializer(lambda amount: amount.source)
+_AMOUNT_SCHEMA = WithJsonSchema({"type": ["number", "string"], "examples": ["12 mV"]})
 _TIME, _ANGLE = _in("s", "a unit of time such as ms"), _in("rad", "a unit of angle such as deg")
 UnitText = Annotated[str, _entry(_unit), WithJsonSchema({"type": ["string"], "examples": ["mV"]})]
 TimeUnit = Annotated[UnitText, _TIME]
 AngleUnit = Annotated[UnitText, _ANGLE]
-Number = Annotated[Amount, _READ, _SOURCE, _schema("12 mV")]
-Positive = Annotated[Number, _bounded(above=True)]
-Size = Annotated[Number, _bounded(above=False)]
-Frequency = Annotated[Amount, _READ, AfterValidator(_hertz), _SOURCE, _schema("2 kHz")]
+Number = Annotated[Amount, _entry(read_amount), PlainSerializer(lambda amount: amount.source), _AMOUNT_SCHEMA]
+Positive = Annotated[Number, AfterValidator(_above)]
+Size = Annotated[Number, AfterValidator(_size)]
+Frequency = Annotated[Positive, _in("Hz", "a frequency such as 2 kHz")]
 Time = Annotated[Number, _TIME]
 Angle = Annotated[Number, _ANGLE]
-Step = Annotated[Angle, _bounded(above=True)]
+Step = Annotated[Angle, AfterValidator(_above)]
 AngularSpeed = Annotated[Number, _in("rad/s", "a unit of angular speed such as rpm")]
 Share = Annotated[Size, _in("", "a share such as 0.1 %")]
 MeasureText = Annotated[str, AfterValidator(_measures)]
@@ -251,7 +239,7 @@ def scale(measures: str, unit: str, gain: Amount | None) -> SensorScale:
     The gain is reading per quantity or quantity per reading: whichever gives what is measured.
     """
     raw, of_reading = dimensions(unit) if unit else (1.0, {})
-    gain = gain or Amount(1.0, 1.0, "", {})
+    gain = gain or ONE
     if gain.value == 0:
         raise UnitError("the gain is zero", "write reading per quantity, such as 100 mV/(N m)")
     kind = _kind(measures)

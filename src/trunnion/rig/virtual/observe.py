@@ -447,7 +447,7 @@ def _sensors(rig: Rig, run: Run) -> tuple[list[Measure], dict[str, SensorChannel
     if run.determinacy is not None and not all(measure.of_motion for measure in measures):
         run.determinacy.refuse()
     pairs = zip(sensors, measures, strict=True)
-    channels = each(pairs, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(system)))
+    channels = each(pairs, lambda item: resolved(*item[0], item[1].unit(system)))
     driver = next(iter(mechanism.drivers), None)
     if driver is None or run.cycle.duration <= 0:
         raise MechanismError(Finding("the mechanism has no driver that moves", "schedule", "give the model a driver"))

@@ -149,10 +149,6 @@ class Rig(Part):
         count = len(self.schedule.rows())
         return [f"run-{number:0{max(2, len(str(count)))}d}" for number in range(1, count + 1)]
 
-    def column(self, sensor: str) -> str:
-        """The column of the readings of a sensor."""
-        return self.sensors[sensor].column or sensor
-
 
 def placed_in_rig(findings: Iterable[Finding], path: Path) -> list[Finding]:
     """Findings of a later stage with file and line of the entry of the rig file that they speak of, where it has it."""
@@ -191,7 +187,7 @@ def _unsound(rig: Rig) -> Iterable[Finding]:
         yield Finding("has a grid and rows", "schedule", "state `over` or `conditions`, not both")
     if not 0 <= rig.schedule.idle.value < LONGEST:
         yield Finding(f"the time {rig.schedule.idle.source} is out of range", "schedule.idle", "write 0.5 s")
-    columns = [("time", "t"), *((f"sensors.{name}", rig.column(name)) for name in rig.sensors)]
+    columns = [("time", "t"), *((f"sensors.{name}", sensor.column or name) for name, sensor in rig.sensors.items())]
     if rig.encoder:
         columns += [("encoder", rig.encoder.column), ("encoder.index", rig.encoder.index or "")]
     first: dict[str, str] = {}
@@ -292,7 +288,7 @@ def draw(channel: SensorChannel, seed: int) -> SensorErrors:
 # ---- what is stated, in one unit ------------------------------------------------------------------------------
 
 
-def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel:
+def resolved(name: str, sensor: Sensor, unit: str) -> SensorChannel:
     """A sensor of what is measured in an SI unit; MechanismError for quantities that do not fit it."""
     try:
         reading, scale = _scale(sensor, unit)
@@ -315,7 +311,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
             findings.append(Finding(f"'{amount.source}' is not in {either}", f"sensors.{name}.{key}"))
     if findings:
         raise MechanismError(findings)
-    return SensorChannel(name, sensor, column, unit, reading, 1 / scale.factor, *sizes.values())
+    return SensorChannel(name, sensor, sensor.column or name, unit, reading, 1 / scale.factor, *sizes.values())
 
 
 def _scale(sensor: Sensor, unit: str) -> tuple[str, units.SensorScale]:

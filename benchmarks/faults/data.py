@@ -38,8 +38,8 @@ _STATISTICS = (
     Fault(
         "cost-slope-unit-dropped",
         "statistics/costs.py",
-        "return -k * B / unit * float(np.exp(-k * t / unit))",
-        "return -k * B * float(np.exp(-k * t / unit))",
+        "return A + varying, -k * varying / unit",
+        "return A + varying, -k * varying",
         ("tests/statistics/test_costs.py",),
     ),
     Fault(

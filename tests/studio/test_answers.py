@@ -253,7 +253,8 @@ def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
 
 def test_what_has_no_length_is_refused():
     text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.05, 0.05]})
-    found = ask(ask="edit", text=text, places=places, gestures=[{"do": "move", "point": "link1.B", "to": places["link1.A"]}])
+    move = {"do": "move", "point": "link1.B", "to": places["link1.A"]}
+    found = ask(ask="edit", text=text, places=places, gestures=[move])
     assert "no length" in found["error"]
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
@@ -25,7 +25,7 @@ from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError,
 __all__ = [
     "Acceleration", "Angle", "AngleOrLength", "AnyQuantity", "Damping", "Dimensionless", "Force", "ForceOrMoment",
     "Inertia", "Length", "LineStiffness", "Mass", "MassOrInertia", "Moment", "Pressure", "Quantity", "Rate",
-    "Stiffness", "Time", "TorsionalStiffness", "evaluation_order", "nominal_dimensions", "term",
+    "Stiffness", "Time", "TorsionalStiffness", "evaluation_order", "nominal_dimensions", "signed_terms",
 ]  # fmt: skip
 
 _SYMMETRIC = re.compile(r"^(.*?)\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
@@ -138,10 +138,10 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
         main, parts = match[1], [match[2], match[3]]
     else:
         return text, None
-    terms = [term(part) for part in parts]
+    terms = signed_terms(parts)
     value = LITERAL.fullmatch(main.strip().lstrip("-+ "))
     unit_of_value = value["unit"] or "" if value else ""
-    unit = next((named for _, named in reversed(terms) if named), unit_of_value)
+    unit = terms[-1][1] or unit_of_value
     if value and unit == "%" and unit_of_value != unit:
         raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", "write the deviation itself")
     if value and not unit_of_value and unit:
@@ -150,15 +150,15 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
         raise UnitError(f"the tolerance in '{text}' has no unit", "write the unit of the tolerance, such as ± 0.05 mm")
     found_dimension = parse(main).dimension({}) if value else None
     deviations = []
-    for number, shares in terms:
-        deviation = literal(number.lstrip("-+"), shares or unit)
+    for number, own_unit in terms:
+        deviation = literal(number.lstrip("-+"), own_unit or unit)
         what = f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}"
         if found_dimension is not None and not (
             fits(deviation.dimension, found_dimension) and fits(found_dimension, deviation.dimension)
         ):
             other = dimension_text(found_dimension)
             raise UnitError(f"{what}, the value {other}", "give both the same unit")
-        if (shares or unit) and not kind.accepts(deviation.dimension):
+        if (own_unit or unit) and not kind.accepts(deviation.dimension):
             raise UnitError(what)
         deviations.append(-deviation.value if number.startswith("-") else deviation.value)
     if len(deviations) == 1:
@@ -168,14 +168,17 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     return main, (min(deviations), max(deviations))
 
 
-def term(text: str) -> tuple[str, str]:
-    """Number (with its sign) and unit of one side of a tolerance."""
-    stripped = text.strip()
-    sign = stripped[:1] if stripped[:1] in ("-", "+") else ""
-    match = LITERAL.fullmatch(stripped[len(sign) :].strip())
-    if not match:
-        raise UnitError(f"the tolerance '{stripped}' is not a number with a unit", "write ± 0.05 mm or +0.02/-0.01 mm")
-    return sign + match["number"], match["unit"] or ""
+def signed_terms(parts: Iterable[str]) -> list[tuple[str, str]]:
+    """Number, with its sign, and unit of each side of a tolerance; a unit that stands at one serves both."""
+    terms: list[tuple[str, str]] = []
+    for text in map(str.strip, parts):
+        sign = text[:1] if text[:1] in ("-", "+") else ""
+        match = LITERAL.fullmatch(text[len(sign) :].strip())
+        if not match:
+            raise UnitError(f"the tolerance '{text}' is not a number with a unit", "write ± 0.05 mm or +0.02/-0.01 mm")
+        terms.append((sign + match["number"], match["unit"] or ""))
+    common = next((unit for _, unit in reversed(terms) if unit), "")
+    return [(number, unit or common) for number, unit in terms]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, PlainValidator, Wi
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.fits import GRADES
 from trunnion.model.entry import Name, OneOf, Part, ShortForm, problem
-from trunnion.model.quantity import AnyQuantity, Dimensionless, Quantity, term
+from trunnion.model.quantity import AnyQuantity, Dimensionless, Quantity, signed_terms
 from trunnion.model.rules import NotNegative, NotWith, Positive, Refers, Selects, Within
 from trunnion.model.units import Kind, UnitError, normalise
 
@@ -58,9 +58,7 @@ class Limits:
                 return cls(upper.source, Quantity.read(-number), upper)
             text = normalise(source).strip()
             if match := _BOTH.match(text):
-                terms = [term(part) for part in match.groups()]
-                unit = next((limit for _, limit in reversed(terms) if limit), "")
-                signed = [Quantity.read(f"{number} {unit_own or unit}".strip()) for number, unit_own in terms]
+                signed = [Quantity.read(" ".join(limit).strip()) for limit in signed_terms(match.groups())]
                 lower, upper = sorted(signed, key=lambda limit: float(limit.evaluate()))
             else:
                 text = _EITHER.sub(r"\1", text)

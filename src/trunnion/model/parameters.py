@@ -285,6 +285,10 @@ class ParameterSet:
             self._evaluate(entry, self.nominal, self.dimension_values)
         self.entries, self.nominal = ReadOnlyDict(self.entries), ReadOnlyDict(self.nominal)
 
+    def value(self, quantity: Quantity | None, absent: float = 0.0) -> float:
+        """The nominal value of a quantity that speaks of the dimensions and is no number of the set."""
+        return absent if quantity is None else float(quantity.evaluate(self.dimension_values))
+
     def stated(self, path: str) -> Number:
         """A number as it was stated, without the error that is added to it."""
         entry = self.entries[path]

@@ -172,11 +172,7 @@ class Varying(Numbers):
         default cp.
         """
         numbers, defaults, written_limits = self.parameter_set, self.tolerance_defaults, self.tolerances()
-
-        def value(quantity: Quantity) -> float:
-            return float(quantity.evaluate(numbers.dimension_values))
-
-        varying: list[Tolerance] = []
+        value, varying = numbers.value, list[Tolerance]()
         for path, entry in numbers.entries.items():
             if path not in self.variations_by_path and not (path in written_limits and may_vary(entry)):
                 continue
@@ -205,7 +201,7 @@ class Varying(Numbers):
         matrix = np.eye(len(place))
         for pair in self.correlations:
             paths = [path for path in self.named_paths(pair.of) if path in place]
-            value = float(pair.coefficient.evaluate(self.parameter_set.dimension_values))
+            value = self.parameter_set.value(pair.coefficient)
             for first, other in combinations(dict.fromkeys(paths), 2):
                 matrix[place[first], place[other]] = matrix[place[other], place[first]] = value
         return matrix
@@ -243,11 +239,7 @@ class Varying(Numbers):
 
     def price(self, path: str, cost: Cost) -> Price:
         """The numbers of a cost of a number or play; MechanismError where a process has no grade of its size."""
-        numbers = self.parameter_set
-
-        def value(quantity: Quantity | None, absent: float = 0.0) -> float:
-            return absent if quantity is None else float(quantity.evaluate(numbers.dimension_values))
-
+        numbers, value = self.parameter_set, self.parameter_set.value
         parameters = {key: value(getattr(cost, key)) for key in FORMULA if getattr(cost, key) is not None}
         if cost.model:
             parameters = {"A": 0.0, **parameters, "unit": float(unit(cost.unit)[0]) if cost.unit else 1.0}

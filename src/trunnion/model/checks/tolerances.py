@@ -103,7 +103,7 @@ def _shape(mechanism: Varying, variation: Any, where: str) -> Iterator[Finding]:
 def tolerance_values(mechanism: Varying) -> Iterator[Finding]:
     """Findings about limits, distributions and correlations as numbers."""
     for entry in mechanism.further_entries:
-        value = float(entry.quantity.evaluate(mechanism.parameter_set.dimension_values))
+        value = mechanism.parameter_set.value(entry.quantity)
         if not np.isfinite(value):
             yield Finding(f"'{entry.quantity.source}' has no finite value ({value})", entry.where)
         yield from limit_findings(entry.rules, value, entry.kind, entry.where)

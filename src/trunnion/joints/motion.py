@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -255,11 +256,7 @@ def _table_span(parameters: Parameters) -> Span:
     chords = [(values[k + 1] - values[k]) / (knots[k + 1] - knots[k]) for k in steps]
     midway = [1.5 * chords[k] - (slopes[k] + slopes[k + 1]) / 4 for k in steps]
     rates = [*midway, *(slopes[1:-1] if parameters["ends"] == "clamped" else slopes)]
-    peak, high, low = np.abs(rates[0]), values[0], values[0]
-    for rate in rates:
-        peak = np.maximum(peak, np.abs(rate))
-    for value in values:
-        high, low = np.maximum(high, value), np.minimum(low, value)
+    peak, high, low = reduce(np.maximum, map(np.abs, rates)), reduce(np.maximum, values), reduce(np.minimum, values)
     signs = {float(sign) for rate in rates for sign in np.ravel(np.sign(rate))}
     delay = primal(parameters["delay"])
     one_way = len(signs) == 1 and 0.0 not in signs and bool(parameters["periodic"] or np.all(delay == 0))

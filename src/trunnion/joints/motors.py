@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,7 @@ from trunnion.algebra.spline import look_up
 __all__ = ["MOTORS", "MotorKind", "constant", "linear", "table", "transmitted"]
 
 Array = NDArray[np.float64]
-# What a motor states, by key, SI; of `points` lists.
-Parameters = Mapping[str, Any]
+Parameters = Mapping[str, Array]  # what a motor states, by key, SI; of `points` lists, of `over` a word
 
 
 @dataclass(frozen=True)
@@ -43,14 +41,12 @@ class MotorKind:
 
 def constant(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """The same effort at every speed."""
-    effort: Array = parameters["effort"] + 0.0 * speed
-    return effort
+    return parameters["effort"] + 0.0 * speed
 
 
 def linear(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """Direct-current motor: T = T_s (1 − ω/ω₀), T_s at standstill, ω₀ without load."""
-    effort: Array = parameters["stall_effort"] * (1.0 - speed / parameters["no_load_speed"])
-    return effort
+    return parameters["stall_effort"] * (1.0 - speed / parameters["no_load_speed"])
 
 
 def induction(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -59,14 +55,14 @@ def induction(speed: Array, time: Array, parameters: Parameters, integral: Array
     Written as 2 T_k s s_k/(s² + s_k²), which has a value at s = 0 too.
     """
     slip, most = 1.0 - speed / parameters["synchronous_speed"], parameters["breakdown_slip"]
-    effort: Array = 2.0 * parameters["breakdown_effort"] * slip * most / (slip * slip + most * most)
-    return effort
+    return 2.0 * parameters["breakdown_effort"] * slip * most / (slip * slip + most * most)
 
 
 def table(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """Points (speed or time, effort) joined by straight lines; before the first and after the last the effort stays."""
-    knots, place = parameters["points.place"], time + 0.0 * speed if parameters["over"] == "time" else speed
-    effort: Array = look_up(knots, parameters["points.effort"], np.clip(place, knots[0], knots[-1]))
+    knots, efforts = list(parameters["points.place"]), list(parameters["points.effort"])
+    place = time + 0.0 * speed if str(parameters["over"]) == "time" else speed
+    effort: Array = look_up(knots, efforts, np.clip(place, knots[0], knots[-1]))
     return effort
 
 
@@ -77,14 +73,12 @@ def speed_control(speed: Array, time: Array, parameters: Parameters, integral: A
 
 
 def _wanted(speed: Array, parameters: Parameters, integral: Array) -> Array:
-    effort: Array = parameters["proportional"] * (parameters["target"] - speed) + parameters["integral"] * integral
-    return effort
+    return parameters["proportional"] * (parameters["target"] - speed) + parameters["integral"] * integral
 
 
 def over_limit(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """By how much what the controller aims at is beyond its limit."""
-    excess: Array = np.abs(_wanted(speed, parameters, integral)) - parameters["limit"]
-    return excess
+    return np.abs(_wanted(speed, parameters, integral)) - parameters["limit"]
 
 
 # of the limit: by how much what is wanted may exceed it before the integral is held. At the limit itself it would be
@@ -98,8 +92,7 @@ def control_error(speed: Array, time: Array, parameters: Parameters, integral: A
     error, limit = parameters["target"] - speed, parameters["limit"]
     aimed = _wanted(speed, parameters, integral)
     left = np.clip(1.0 - (np.abs(aimed) / limit - 1.0) / BEYOND, 0.0, 1.0)
-    rate: Array = np.where(aimed * error > 0, left * error, error)
-    return rate
+    return np.where(aimed * error > 0, left * error, error)
 
 
 MOTORS: dict[str, MotorKind] = {

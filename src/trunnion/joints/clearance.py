@@ -119,11 +119,8 @@ def pin_transform(clearance: Number, length: Number, beta: Number, xi: Number) -
 
 def described(radius: Number, beta: Number, xi: Number) -> list[Vector]:
     """End offsets c₁ = ρ(cos(ξ + β/2), sin(ξ + β/2)), c₂ = ρ(cos(ξ − β/2), sin(ξ − β/2)), m.  [P 12, 13]"""
-    vectors: list[Vector] = []
-    for angle in (xi + 0.5 * beta, xi - 0.5 * beta):
-        xp = namespace(angle)
-        vectors.append((radius * xp.cos(angle), radius * xp.sin(angle)))
-    return vectors
+    xp = namespace(xi, beta)
+    return [(radius * xp.cos(angle), radius * xp.sin(angle)) for angle in (xi + 0.5 * beta, xi - 0.5 * beta)]
 
 
 def describing(first: Vector, second: Vector) -> tuple[Number, Number]:
@@ -159,9 +156,7 @@ def pressed(load: Vector, radius: Number, least: Number = 0.0) -> Vector:
 
     least: load, N, below which the seat goes straight through the middle instead of jumping, c = ρ Q/least.
     """
-    square: Number = 0.0
-    for part in load:
-        square = square + part * part
+    square: Number = sum((part * part for part in load), 0.0)
     xp = namespace(square)
     square = xp.where(square > least * least, square, least * least)
     positive = square > 0
@@ -171,10 +166,7 @@ def pressed(load: Vector, radius: Number, least: Number = 0.0) -> Vector:
 
 def worst_case(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
     """Most work of the loads over the whole play: Σ ρᵢ |Qᵢ|, in their unit times m."""
-    total: Number = 0.0
-    for load, radius in zip(loads, radii, strict=True):
-        total = total + radius * length_of(*load)
-    return total
+    return sum((radius * length_of(*load) for load, radius in zip(loads, radii, strict=True)), 0.0)
 
 
 # ---- friction -------------------------------------------------------------------------------------------------

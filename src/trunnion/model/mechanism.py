@@ -212,7 +212,8 @@ class Mechanism(Varying):
         Lengths in m. Raises MechanismError if the structure does not determine the motion, or if no position of the
         cycle can be assembled.
         """
-        return _notebook().mechanism_figure(self)  # type: ignore[no-any-return]
+        views = import_module("trunnion.views.shown")  # by name: it stands above the model
+        return views.mechanism_figure(self)  # type: ignore[no-any-return]
 
     def studio(self, height: int = 720) -> Any:
         """The studio on the mechanism, for a cell of a notebook; its `mechanism` is what was made of it there.
@@ -238,7 +239,7 @@ class Mechanism(Varying):
 
     def _repr_html_(self) -> str:
         """What a notebook shows: drawing, structural formula, mobility, findings. Never raises."""
-        return str(_notebook().mechanism_html(self))
+        return str(import_module("trunnion.views.shown").mechanism_html(self))
 
     @cached_property
     def digest(self) -> str:
@@ -256,11 +257,6 @@ class WorkedOut(dict[str, Any]):
 
     def __reduce__(self) -> tuple[type[WorkedOut], tuple[()]]:
         return WorkedOut, ()
-
-
-def _notebook() -> Any:
-    """The views of a notebook, by name: they stand above the model, which knows nothing else of them."""
-    return import_module("trunnion.views.shown")
 
 
 def _canonical(value: Any) -> Any:

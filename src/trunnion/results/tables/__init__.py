@@ -53,30 +53,27 @@ def columns(result: xr.Dataset, table: str = "") -> list[Column]:
 def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
     """The table that a file of this name holds: of `x.positions.csv` the positions; MechanismError as `check_table`."""
     kind = kind_of(result)
-    check_table(path, kind, "contact" in result.dims)
-    inner = _inner(path)
+    inner = check_table(path, kind, "contact" in result.dims)
     return inner if inner in KINDS[kind] else next(iter(KINDS[kind]))
 
 
-def check_table(path: str | os.PathLike[str], kind: str, in_play: bool = True) -> None:
-    """MechanismError for a name such as `x.contributions.csv`, which asks for a table that a kind of result has not.
+def check_table(path: str | os.PathLike[str], kind: str, in_play: bool = True) -> str:
+    """What a file's name asks for: the table `positions` of `x.positions.csv`, or else what stands there.
 
-    Only of kinds with several tables, and of a cycle those of a motion in time; a part of a name with other characters
-    than letters (`x.2.csv`) asks for none. in_play: of a motion, whether a joint is in play.
+    MechanismError for a table that a kind of result has not: of kinds with several tables, and of a cycle for those of
+    a motion in time; a part of a name with other characters than letters (`x.2.csv`) asks for none. in_play: of a
+    motion, whether a joint is in play.
     """
-    inner, suffix = _inner(path), Path(path).suffix
+    inner, suffix = Path(Path(path).stem).suffix.lstrip(".").lower(), Path(path).suffix
     tables = [name for name in KINDS[kind] if in_play or name not in OF_CONTACTS]
     others = set(KINDS["motion"]) - {"times"} if kind in ("cycle", "motion") else set()
     if suffix.lower() not in TABULAR or not inner.isalpha() or inner in tables:
-        return
+        return inner
     if inner in others or len(tables) > 1:
         named = f" or x.TABLE{suffix}, TABLE: {', '.join(tables)}" if len(tables) > 1 else ""
         why = ": no joint is in play" if inner in KINDS[kind] else " of a cycle" if kind == "cycle" else ""
         raise MechanismError(Finding(f"there is no table '{inner}'{why}", str(path), f"use x{suffix}{named}"))
-
-
-def _inner(path: str | os.PathLike[str]) -> str:
-    return Path(Path(path).stem).suffix.lstrip(".").lower()
+    return inner
 
 
 # ---- which columns a file gets --------------------------------------------------------------------------------

@@ -4,10 +4,8 @@ import gc
 import os
 import signal
 from collections import defaultdict
-from collections.abc import Callable
 from functools import cache, lru_cache
 from importlib.util import find_spec
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -31,48 +29,44 @@ AT_MOST = 2  # slow cases of a test with like cases, where the test does not say
 
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(
-    "trunnion",
-    max_examples=25,
-    deadline=None,
-    derandomize=True,
-    database=None,
+    "trunnion", max_examples=25, deadline=None, derandomize=True, database=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-)
+)  # fmt: skip
 settings.load_profile("trunnion")
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish():
     """What was found is no longer looked through for what is left over, and what many tests ask for is made once."""
     gc.collect()
     gc.freeze()
     _keep_what_is_asked_for_again()
 
 
-def _keep_what_is_asked_for_again() -> None:
+def _keep_what_is_asked_for_again():
     """The nodes of more model files than a verb reads, and the verbs, which Typer makes anew for every call of them."""
     import typer.main as maker
 
     from trunnion.model import file, rewrite
 
     file.composed = rewrite.composed = lru_cache(maxsize=64)(file.composed.__wrapped__)
-    made: Callable[[Any], Any] = maker.get_command
+    made = maker.get_command
 
     @cache
-    def kept(app: Any, *verbs: Any) -> Any:
+    def kept(app, *verbs):
         return made(app)
 
     maker.get_command = lambda app: kept(app, *(one.callback for one in app.registered_commands))
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser):
     """`pytest -m slow --every-case` runs also the like cases that are left out."""
     parser.addoption("--every-case", action="store_true", help="run also the like cases that are left out")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config, items):
     """Of a test marked `spread(n, *also)`, n of its cases, evenly chosen, and those named stay in `make test`; of the
     others at most `AT_MOST` are slow tests, of the slow cases of a test marked `sample(n)` n, evenly chosen as well."""
-    left: list[pytest.Item] = []
+    left = []
     for (_, count, *also), found in _marked(items, "spread").items():
         kept = _evenly(count, len(found))
         others = [item for k, item in enumerate(found) if k not in kept and _case(item) not in also]
@@ -88,26 +82,26 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=left)
 
 
-def _case(item: pytest.Item) -> str:
+def _case(item):
     """The case of a test: what stands in brackets behind its name."""
     return item.nodeid.partition("[")[2].removesuffix("]")
 
 
-def _but_evenly(count: int, items: list[pytest.Item]) -> list[pytest.Item]:
+def _but_evenly(count, items):
     """All but so many, evenly chosen."""
     kept = _evenly(min(count, len(items)), len(items))
     return [item for k, item in enumerate(items) if k not in kept]
 
 
-def _marked(items: list[pytest.Item], name: str) -> dict[tuple[Any, ...], list[pytest.Item]]:
+def _marked(items, name):
     """The cases of each test that has a mark, by the test and the mark's arguments."""
-    cases: defaultdict[tuple[Any, ...], list[pytest.Item]] = defaultdict(list)
+    cases = defaultdict(list)
     for item in items:
         if mark := item.get_closest_marker(name):
             cases[item.nodeid.partition("[")[0], *mark.args].append(item)
     return cases
 
 
-def _evenly(count: int, of: int) -> set[int]:
+def _evenly(count, of):
     """Indices of so many, evenly chosen."""
     return {round((k + 0.5) * of / count - 0.5) for k in range(count)}

@@ -379,27 +379,14 @@ def screwed_strut() -> Data:
 
 
 MODELS: Mapping[str, Callable[[], Data]] = {
-    "four-bar": four_bar,
-    "four-bar, other branch": lambda: four_bar(side=-1.0),
-    "slider-crank": slider_crank,
-    "inverted slider-crank": inverted_slider_crank,
-    "Watt six-bar": watt_six_bar,
-    "Stephenson six-bar": stephenson_six_bar,
-    "class III": class_three,
-    "five-bar": five_bar,
-    "excavator": excavator,
-    "serial arm": serial_arm,
-    "Scotch yoke": scotch_yoke,
-    "elliptic bar": elliptic_bar,
-    "tangent drive": tangent_drive,
-    "geared five-bar": geared_five_bar,
-    "planet drive": planet_drive,
-    "geared loop": geared_loop,
-    "rocker train": rocker_train,
-    "rack on a rocker": rack_on_rocker,
-    "rack in a loop": rack_in_loop,
+    "four-bar": four_bar, "four-bar, other branch": lambda: four_bar(side=-1.0), "slider-crank": slider_crank,
+    "inverted slider-crank": inverted_slider_crank, "Watt six-bar": watt_six_bar,
+    "Stephenson six-bar": stephenson_six_bar, "class III": class_three, "five-bar": five_bar, "excavator": excavator,
+    "serial arm": serial_arm, "Scotch yoke": scotch_yoke, "elliptic bar": elliptic_bar, "tangent drive": tangent_drive,
+    "geared five-bar": geared_five_bar, "planet drive": planet_drive, "geared loop": geared_loop,
+    "rocker train": rocker_train, "rack on a rocker": rack_on_rocker, "rack in a loop": rack_in_loop,
     "screwed strut": screwed_strut,
-}
+}  # fmt: skip
 
 
 def build(data: Data, **options: Any) -> Mechanism:

@@ -1,11 +1,19 @@
 """What the mechanisms of the tests are written with: joints, slides and links as plain data."""
 
 import copy
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import trunnion
+
 Data = dict[str, Any]
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def example(name: str) -> trunnion.Mechanism:
+    return trunnion.read(EXAMPLES / f"{name}.yaml")
 
 
 def joined(chains: str, **more: Data) -> Data:

@@ -120,13 +120,9 @@ def _drawn(seed: int, chains: str, drivers: tuple[str, ...]) -> Drawn:
         "frame": "link",
     }
     data: Data = {
-        "space": "spatial",
-        "gravity": [1.0, -2.0, -9.0],
-        "links": links,
-        "joints": stated,
-        "drivers": driven,
+        "space": "spatial", "gravity": [1.0, -2.0, -9.0], "links": links, "joints": stated, "drivers": driven,
         "loads": loads,
-    }
+    }  # fmt: skip
     return started(data, home)
 
 
@@ -237,13 +233,9 @@ def cardan(
     twists = (square, square, square, np.radians(180 - misalignment - error))
     rows: list[Data] = []
     table = zip(
-        ("input", "pin-1", "pin-2", "output"),
-        ("input-shaft", "cross", "output-shaft", "ground"),
-        twists,
-        (1e-5, 1e-5, 2e-5, 1e-5),
-        (0.01001, 0.01002, 0.01001, 0.01002),
-        strict=True,
-    )
+        ("input", "pin-1", "pin-2", "output"), ("input-shaft", "cross", "output-shaft", "ground"), twists,
+        (1e-5, 1e-5, 2e-5, 1e-5), (0.01001, 0.01002, 0.01001, 0.01002), strict=True,
+    )  # fmt: skip
     for name, link, twist, distance, radius in table:
         kind = "revolute" if name == "input" else "cylindrical"
         row: Data = {"joint": name, "type": kind, "link": link, "twist": twist, "distance": offset * distance}
@@ -317,24 +309,14 @@ HEADS = ", ".join(f"leg-{k} -head-{k}:spherical- platform" for k in range(1, 7))
 
 # name: a mechanism; seeds at which the whole range is well conditioned
 MODELS: dict[str, Callable[[], Drawn]] = {
-    "RSSR": lambda: chain("RSSR", 24),
-    "RSSP": lambda: chain("RSSP", 24),
-    "RCCC": lambda: chain("RCCC", 7),
-    "RRRSR": lambda: chain("RRRSR", 6),
-    "RSUR": lambda: chain("RSUR", 4),
-    "RSSH": lambda: chain("RSSH", 12),
-    "HUSR": lambda: chain("HUSR", 16),
-    "PSUR": lambda: chain("PSUR", 20),
-    "RUSP": lambda: chain("RUSP", 9),
-    "CRSR": lambda: chain("CRSR", 8),
-    "RECR": lambda: chain("RECR", 3),
-    "RSFRC": lambda: chain("RSFRC", 14),
-    "RCSC, two drivers": lambda: chain("RCSC", 13, ("A", "D")),
-    "RRRRRRR": lambda: chain("RRRRRRR", 23),
-    "two loops in one group": lambda: draw(21, TWO_LOOPS),
-    "two RSSR in series": lambda: draw(14, TWO_RSSR),
+    "RSSR": lambda: chain("RSSR", 24), "RSSP": lambda: chain("RSSP", 24), "RCCC": lambda: chain("RCCC", 7),
+    "RRRSR": lambda: chain("RRRSR", 6), "RSUR": lambda: chain("RSUR", 4), "RSSH": lambda: chain("RSSH", 12),
+    "HUSR": lambda: chain("HUSR", 16), "PSUR": lambda: chain("PSUR", 20), "RUSP": lambda: chain("RUSP", 9),
+    "CRSR": lambda: chain("CRSR", 8), "RECR": lambda: chain("RECR", 3), "RSFRC": lambda: chain("RSFRC", 14),
+    "RCSC, two drivers": lambda: chain("RCSC", 13, ("A", "D")), "RRRRRRR": lambda: chain("RRRRRRR", 23),
+    "two loops in one group": lambda: draw(21, TWO_LOOPS), "two RSSR in series": lambda: draw(14, TWO_RSSR),
     "platform on six legs": lambda: draw(3, f"ground -A- crank, {FEET}, {HEADS}"),
-}
+}  # fmt: skip
 
 
 def floating(nut: str) -> tuple[Data, Data]:

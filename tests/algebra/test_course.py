@@ -1,35 +1,32 @@
 """Courses: polynomials between breaks, against closed forms."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.course import Accuracy, Courses
 
 TURN = 2 * np.pi
 
 
-def course(*rows: Callable[[Any], Any], breaks: Any = (0.0, TURN), state: Any = None, **more: Any) -> Courses:
-    def solve(time: Any) -> Any:
+def course(*rows, breaks=(0.0, TURN), state=None, **more):
+    def solve(time):
         states = np.zeros(len(time), int) if state is None else state(time)
         return np.array([row(time) + 0.0 * time for row in rows]), states
 
     return Courses.of(solve, np.array(breaks, float), **more)
 
 
-def top(found: Courses, row: int = 0, sign: float = 1.0, **more: Any) -> Place:
+def top(found, row=0, sign=1.0, **more):
     place = found.extreme(lambda rows: rows[row], sign, **more)
     assert place is not None
     return place
 
 
 @given(st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.floats(0, TURN))
-def test_harmonics_are_followed(parts: list[float], phase: float) -> None:
-    def value(t: Any) -> Any:
+def test_harmonics_are_followed(parts, phase):
+    def value(t):
         return sum(part * np.cos((k + 1) * t + phase) for k, part in enumerate(parts))
 
     found, time = course(value), np.linspace(0, TURN, 20_001)
@@ -42,7 +39,7 @@ def test_harmonics_are_followed(parts: list[float], phase: float) -> None:
         assert -1e-8 * size <= sign * top(found, sign=sign).value - best <= 1e-6 * size
 
 
-def test_a_stated_jump_has_both_sides_and_the_instant_between_is_no_value() -> None:
+def test_a_stated_jump_has_both_sides_and_the_instant_between_is_no_value():
     found = course(lambda t: np.where(t == 1.0, 50.0, np.where(t < 1.0, t, -1.0)), breaks=(0.0, 1.0, 2.0))
     assert found.asked == 12 * (3 + 3)
     assert top(found) == (pytest.approx(1.0), pytest.approx(1.0), True, False)
@@ -54,7 +51,7 @@ def test_a_stated_jump_has_both_sides_and_the_instant_between_is_no_value() -> N
 
 @example(2.0013047674295295)  # between an edge and the first place of a much wider panel
 @given(st.floats(0.05, 6.2))
-def test_a_jump_and_a_kink_that_nobody_states_are_located(place: float) -> None:
+def test_a_jump_and_a_kink_that_nobody_states_are_located(place):
     found = course(lambda t: np.where(t < place, 2.0 + t, -t), lambda t: np.abs(t - place))
     assert top(found).value == pytest.approx(2.0 + place, rel=1e-8)
     assert top(found).time == pytest.approx(place, abs=1e-8)
@@ -63,7 +60,7 @@ def test_a_jump_and_a_kink_that_nobody_states_are_located(place: float) -> None:
     assert found.mean()[1] == pytest.approx((place**2 + (TURN - place) ** 2) / 2 / TURN, rel=1e-7)
 
 
-def test_an_end_of_what_has_a_value_is_a_break() -> None:
+def test_an_end_of_what_has_a_value_is_a_break():
     """As of a mechanism that cannot be assembled on: its rates grow without bounds towards the end."""
     found = course(
         lambda t: np.sqrt(np.where(t < 2.0, 2.0 - t, np.nan)),
@@ -80,11 +77,11 @@ def test_an_end_of_what_has_a_value_is_a_break() -> None:
     assert found.extreme(lambda rows: rows[0], panels=gap) is None
 
 
-def test_one_state_at_an_instant_is_none() -> None:
+def test_one_state_at_an_instant_is_none():
     """A node on which it falls is parted from its panel, whose polynomial does not have it."""
     place = float(course(lambda t: t).edges[:2].mean() + TURN / 12 * np.cos(np.pi * 4.5 / 12))
 
-    def alone(t: Any) -> Any:
+    def alone(t):
         return np.where(np.abs(t - place) < 1e-13, 1, 0)
 
     found = course(lambda t: np.where(alone(t), 100.0, np.cos(t)), state=alone)
@@ -92,18 +89,18 @@ def test_one_state_at_an_instant_is_none() -> None:
     assert top(found).value == pytest.approx(1.0)
 
 
-def test_noise_takes_bounded_work() -> None:
+def test_noise_takes_bounded_work():
     noise = np.random.default_rng(1)
     found = course(lambda t: np.cos(t) + 1e-7 * noise.normal(size=np.shape(t)), accuracy=Accuracy(widest=1 / 60))
     assert found.asked < 20_000
     assert top(found).value == pytest.approx(1.0, abs=1e-6)
 
 
-def test_states_that_toss_in_one_place_take_little_work() -> None:
+def test_states_that_toss_in_one_place_take_little_work():
     """As beside a singular position: a break has one panel of mixed states in every round, or two, and no crowd."""
     noise = np.random.default_rng(1)
 
-    def state(t: Any) -> Any:
+    def state(t):
         return np.where((np.abs(t - 1.0) < 1e-7) & (noise.uniform(size=np.shape(t)) < 0.5), 5, np.where(t < 1.0, 0, 1))
 
     found = course(lambda t: np.cos(t), state=state)
@@ -114,7 +111,7 @@ def test_states_that_toss_in_one_place_take_little_work() -> None:
     assert top(wide, panels=wide.states == 0).value == pytest.approx(1.0)
 
 
-def test_an_edge_more_changes_nothing() -> None:
+def test_an_edge_more_changes_nothing():
     found = course(lambda t: np.cos(t), lambda t: np.where(t < 2.0, t, 7.0), breaks=(0.0, 2.0, TURN))
     cut, time = found.parted(np.array([-1.0, 0.3, 1.7, TURN, 9.0])), np.linspace(0.1, 6.0, 101)
     assert {0.3, 1.7} == set(cut.edges) - set(found.edges)
@@ -124,13 +121,13 @@ def test_an_edge_more_changes_nothing() -> None:
     assert found.panels_of(np.array([2.0 - 1e-9, 2.0])).tolist() == [np.flatnonzero(found.edges == 2.0)[0]] * 2
 
 
-def test_of_equal_tops_the_first_counts() -> None:
+def test_of_equal_tops_the_first_counts():
     found = course(lambda t: np.cos(2 * t - 1))
     assert top(found).time == pytest.approx(0.5, abs=1e-6)
     assert not top(found).at_break
 
 
-def test_what_is_made_of_rows() -> None:
+def test_what_is_made_of_rows():
     """The size of a vector that passes zero has a corner there; its rows have none."""
     found = course(lambda t: np.cos(t), lambda t: 0.0)
     size = found.extreme(lambda rows: np.hypot(*rows), -1.0)
@@ -140,7 +137,7 @@ def test_what_is_made_of_rows() -> None:
 
 
 @given(st.floats(-0.99, 0.99))
-def test_passages_dwell_and_rates(level: float) -> None:
+def test_passages_dwell_and_rates(level):
     found = course(lambda t: np.cos(t), lambda t: (t - 2.0) ** 2)
     place = np.arccos(level)
     assert found.passages(0, level) == pytest.approx([place, TURN - place], abs=1e-8)
@@ -148,10 +145,10 @@ def test_passages_dwell_and_rates(level: float) -> None:
     assert found.derivative().at(np.array([1.0]))[:, 0] == pytest.approx([-np.sin(1.0), -2.0], abs=1e-7)
 
 
-def test_many_mechanisms_have_breaks_of_their_own() -> None:
+def test_many_mechanisms_have_breaks_of_their_own():
     places = np.array([1.0, 2.0, 3.5])
 
-    def solve(mechanism: Any, time: Any) -> Any:
+    def solve(mechanism, time):
         jump = places[mechanism][:, None]
         return np.array([np.where(time < jump, 1.0, -time)]), np.zeros(time.shape, int)
 

@@ -1,8 +1,6 @@
 """Dual arithmetic against exact identities and finite differences, alone, nested, mixed in depth, on arrays."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,26 +16,26 @@ deep = st.builds(Dual, duals, duals)
 anything = st.one_of(parts, duals, deep)
 
 
-def flat(number: Any) -> list[float]:
+def flat(number):
     """All components of a number at depth 2."""
     number = number if isinstance(number, Dual) else Dual(number, 0.0)
     if number.depth == 1:
         number = Dual(Dual(number.real, 0.0), Dual(number.dual, 0.0))
 
-    def pair(part: Any) -> list[float]:
+    def pair(part):
         return [float(part.real), float(part.dual)] if isinstance(part, Dual) else [float(part), 0.0]
 
     return [*pair(number.real), *pair(number.dual)]
 
 
-def close(a: Any, b: Any, tolerance: float = 1e-9) -> None:
+def close(a, b, tolerance=1e-9):
     """Equal to rounding; a division by 1e-3 thrice may amplify it a billionfold against the smallest part."""
     x, y = flat(a), flat(b)
     np.testing.assert_allclose(x, y, rtol=tolerance, atol=tolerance * max(1e-6, *map(abs, x), *map(abs, y)))
 
 
 @given(anything, anything, anything)
-def test_ring_identities(x: Any, y: Any, z: Any) -> None:
+def test_ring_identities(x, y, z):
     close((x + y) + z, x + (y + z))
     close(x * y, y * x)
     close(x * (y + z), x * y + x * z)
@@ -47,7 +45,7 @@ def test_ring_identities(x: Any, y: Any, z: Any) -> None:
 
 
 @given(deep, deep)
-def test_division_undoes_multiplication(x: Any, y: Any) -> None:
+def test_division_undoes_multiplication(x, y):
     """Each ε part divides by y once more, so rounding grows with the cube of its ε parts over itself."""
     growth = max(map(abs, flat(y))) / abs(primal(y))
     tolerance = max(1e-9, 1e-15 * growth**3)
@@ -56,7 +54,7 @@ def test_division_undoes_multiplication(x: Any, y: Any) -> None:
     close(x / y, x * y**-1, tolerance)
 
 
-def test_epsilon_squared_is_zero_at_each_depth() -> None:
+def test_epsilon_squared_is_zero_at_each_depth():
     eps = Dual(0.0, 1.0)
     assert flat(eps * eps) == [0.0] * 4
     outer = Dual(Dual(0.0, 0.0), Dual(1.0, 0.0))
@@ -69,7 +67,7 @@ RANGES = {
     "sinh": (-3, 3), "cosh": (-3, 3), "tanh": (-2, 2), "exp": (-3, 3), "log": (0.3, 9), "sqrt": (0.3, 9),
     "square": (-5, 5), "abs": (0.2, 5),
 }  # fmt: skip
-FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], float, float]] = {
+FUNCTIONS = {
     **{name: (lambda xp, x, name=name: getattr(xp, name)(x), *ends) for name, ends in RANGES.items()},
     "abs, negative": (lambda xp, x: xp.abs(x), -5, -0.2), "arctan2 by y": (lambda xp, x: xp.arctan2(x, -0.7), 0.2, 3),
     "arctan2 by x": (lambda xp, x: xp.arctan2(0.7, x), -3, 3),
@@ -86,7 +84,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], float, float]] = {
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_first_derivative(name: str) -> None:
+def test_first_derivative(name):
     """Against eighth-order differences, good to 1e-9 here, on an array in one go."""
     function, low, high = FUNCTIONS[name]
     x = np.linspace(low, high, 23) + 0.013 * (high - low) / 23
@@ -101,14 +99,14 @@ def test_first_derivative(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_second_derivative_by_nesting(name: str) -> None:
+def test_second_derivative_by_nesting(name):
     """The derivative of the derivative: dual numbers of dual numbers against differences of the first derivative."""
     function, low, high = FUNCTIONS[name]
     x = np.linspace(low, high, 12)[1:-1]
     h = 1e-3 * min(1.0, high - low)
     weights = np.array([-1 / 60, 3 / 20, -3 / 4, 0, 3 / 4, -3 / 20, 1 / 60]) / h
 
-    def first(at: Any) -> Any:
+    def first(at):
         return derivative(function(functions, seed(at)))
 
     expected = sum(w * first(x + k * h) for k, w in zip(range(-3, 4), weights, strict=True))
@@ -120,7 +118,7 @@ def test_second_derivative_by_nesting(name: str) -> None:
     np.testing.assert_allclose(derivative(number.real), derivative(number).real, rtol=1e-14, atol=1e-14)
 
 
-def test_mixed_depths() -> None:
+def test_mixed_depths():
     """A shallower number is a constant for the outermost ε of a deeper one."""
     shallow, outer = Dual(3.0, 1.0), Dual(Dual(2.0, 0.0), Dual(1.0, 0.0))
     product = shallow * outer
@@ -135,14 +133,14 @@ def test_mixed_depths() -> None:
     assert (third + 1.0).depth == (1.0 + third).depth == (third * shallow).depth == 3
 
 
-def test_a_quantity_of_two_levels_is_a_differentiable_screw() -> None:
+def test_a_quantity_of_two_levels_is_a_differentiable_screw():
     """Transference and differentiation at once: cos of a dual angle θ + ε s, derived by θ."""
     theta, s = 0.7, 0.3
     screw = functions.cos(Dual(Dual(theta, s), Dual(1.0, 0.0)))
     assert flat(screw) == pytest.approx([math.cos(theta), -s * math.sin(theta), -math.sin(theta), -s * math.cos(theta)])
 
 
-NOT_THERE: dict[str, Callable[[Any], Any]] = {
+NOT_THERE = {
     "division by zero": lambda zero: 1.0 / zero,
     "division by dual zero of a dual": lambda zero: Dual(1.0, 2.0) / zero,
     "sqrt of 0": lambda zero: functions.sqrt(zero), "sqrt below 0": lambda zero: functions.sqrt(zero - 1.0),
@@ -156,7 +154,7 @@ NOT_THERE: dict[str, Callable[[Any], Any]] = {
 
 @pytest.mark.parametrize("shape", ["float", "array", "nested"])
 @pytest.mark.parametrize("name", NOT_THERE)
-def test_no_silent_number_where_there_is_no_derivative(name: str, shape: str) -> None:
+def test_no_silent_number_where_there_is_no_derivative(name, shape):
     """NaN in the dual part of every kind of number: neither an infinity nor an exception."""
     zero = {
         "float": Dual(0.0, 1.0),
@@ -170,21 +168,21 @@ def test_no_silent_number_where_there_is_no_derivative(name: str, shape: str) ->
     assert np.all(np.isnan(dual)), number
 
 
-def test_nan_stays_in_its_lane() -> None:
+def test_nan_stays_in_its_lane():
     root = functions.sqrt(Dual(np.array([0.0, 4.0, -1.0, np.nan]), 1.0))
     np.testing.assert_array_equal(root.real, [np.nan, 2.0, np.nan, np.nan])
     np.testing.assert_array_equal(root.dual, [np.nan, 0.25, np.nan, np.nan])
 
 
 @pytest.mark.parametrize("function", [functions.maximum, functions.minimum])
-def test_nan_is_not_lost_in_a_comparison(function: Callable[[Any, Any], Any]) -> None:
+def test_nan_is_not_lost_in_a_comparison(function):
     """As with NumPy: the larger of a number and NaN is NaN, whichever comes first."""
     nan, one = Dual(np.nan, 1.0), Dual(1.0, 1.0)
     assert np.isnan(primal(function(nan, one)))
     assert np.isnan(primal(function(one, nan)))
 
 
-def test_arrays_on_the_left() -> None:
+def test_arrays_on_the_left():
     array, x = np.array([1.0, 2.0, 4.0]), Dual(2.0, 3.0)
     for found, real, dual in (
         (array + x, array + 2, 3.0),
@@ -201,7 +199,7 @@ def test_arrays_on_the_left() -> None:
         )
 
 
-def test_tests_and_constants_are_plain() -> None:
+def test_tests_and_constants_are_plain():
     x = Dual(np.array([1.0, np.nan, np.inf]), 1.0)
     np.testing.assert_array_equal(functions.isnan(x), [False, True, False])
     np.testing.assert_array_equal(functions.isfinite(x), [True, False, False])

@@ -1,11 +1,8 @@
 """Unrolled solves against numpy.linalg on stacks, dual systems and eigenvalues against formulas and differences."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from mechanisms import Array
 from trunnion.algebra import duallinalg as dl
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -14,7 +11,7 @@ SIZES = [1, 2, 3, 4, 6]
 LANES = 400
 
 
-def stack(n: int, seed: int) -> Array:
+def stack(n, seed):
     """Random matrices (lane, n, n); half need row swaps: zeros on the diagonal or a reversed order of rows."""
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(LANES, n, n))
@@ -25,16 +22,16 @@ def stack(n: int, seed: int) -> Array:
     return a[keep]
 
 
-def rows_of(a: Array) -> list[list[Any]]:
+def rows_of(a):
     return [[a[..., i, j] for j in range(a.shape[-1])] for i in range(a.shape[-2])]
 
 
-def stacked(rows: list[list[Any]]) -> Array:
+def stacked(rows):
     return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_solve(n: int) -> None:
+def test_solve(n):
     a = stack(n, n)
     b = np.random.default_rng(99).normal(size=(len(a), n, 2))
     found, _ = linalg.solve(rows_of(a), list(b[:, :, 0].T), list(b[:, :, 1].T))
@@ -44,7 +41,7 @@ def test_solve(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_inverse_and_determinant(n: int) -> None:
+def test_inverse_and_determinant(n):
     a = stack(n, 10 + n)
     inverse, determinant = linalg.inverse(rows_of(a))
     np.testing.assert_allclose(stacked(inverse), np.linalg.inv(a), rtol=1e-9, atol=1e-10)
@@ -52,7 +49,7 @@ def test_inverse_and_determinant(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_dual_solve(n: int) -> None:
+def test_dual_solve(n):
     """x₀ = A⁻¹ b₀, x₁ = A⁻¹ (b₁ − B x₀)."""
     a = stack(n, 30 + n)
     rng = np.random.default_rng(5)
@@ -68,7 +65,7 @@ def test_dual_solve(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_dual_inverse_and_determinant(n: int) -> None:
+def test_dual_inverse_and_determinant(n):
     """(A + ε B)⁻¹ = A⁻¹ − ε A⁻¹ B A⁻¹ and det = det A (1 + ε tr(A⁻¹ B))."""
     a = stack(n, 40 + n)
     slope = np.random.default_rng(6).normal(size=a.shape)
@@ -82,7 +79,7 @@ def test_dual_inverse_and_determinant(n: int) -> None:
     np.testing.assert_allclose(derivative(product), np.linalg.det(a) * trace, rtol=1e-9, atol=1e-9)
 
 
-SINGULAR: dict[str, list[list[Any]]] = {
+SINGULAR = {
     "floats": [[0.0, 1.0], [0.0, 2.0]],
     "proportional": [[1.0, 2.0], [2.0, 4.0]],
     "arrays": [[np.zeros(2), np.ones(2)], [np.zeros(2), np.ones(2)]],
@@ -93,7 +90,7 @@ SINGULAR: dict[str, list[list[Any]]] = {
 
 
 @pytest.mark.parametrize("name", SINGULAR)
-def test_singular_is_data_not_an_exception(name: str) -> None:
+def test_singular_is_data_not_an_exception(name):
     """Non-finite solutions, determinant 0 or NaN, whatever kind of numbers."""
     (x,), _ = linalg.solve(SINGULAR[name], [1.0, 1.0])
     assert not np.all(np.isfinite([np.ravel(primal(value))[0] for value in x]))
@@ -102,7 +99,7 @@ def test_singular_is_data_not_an_exception(name: str) -> None:
     assert not np.all(np.isfinite([np.ravel(primal(v))[0] for row in inverse for v in row]))
 
 
-def test_a_large_entry_does_not_hide_a_small_pivot() -> None:
+def test_a_large_entry_does_not_hide_a_small_pivot():
     """Without row pivoting the first unknown would come out 0."""
     (x,), _ = linalg.solve([[1e-20, 1.0], [1.0, 1.0]], [1.0, 2.0])
     np.testing.assert_allclose([float(v) for v in x], [1.0, 1.0], rtol=1e-12)
@@ -113,7 +110,7 @@ SQUARE = [(n, n) for n in (1, 2, 3, 6)]
 STEP = 1e-5
 
 
-def random(shape: tuple[int, int], seed: int = 0) -> Dual:
+def random(shape, seed=0):
     """Stacks with singular values from 1 to 2, evenly apart: the figures then test the formulas, not the condition."""
     rng = np.random.default_rng([*shape, seed])
     m, n = shape
@@ -124,21 +121,21 @@ def random(shape: tuple[int, int], seed: int = 0) -> Dual:
     return Dual(real, rng.normal(size=real.shape))
 
 
-def symmetric(n: int, seed: int = 0) -> Dual:
+def symmetric(n, seed=0):
     """Positive definite stacks with a symmetric dual part."""
     a = random((n, n), seed)
     b = a.dual + np.swapaxes(a.dual, -1, -2)
     return Dual(a.real @ np.swapaxes(a.real, -1, -2), b)
 
 
-def same(found: Any, expected: Any, tolerance: float = TIGHT) -> None:
+def same(found, expected, tolerance=TIGHT):
     """Equal to a tolerance relative to the largest entry of each part, over all lanes."""
     for part, other in zip(split(found), split(expected), strict=True):
         scale = max(1.0, float(np.max(np.abs(other))))
         np.testing.assert_allclose(part, np.broadcast_to(other, part.shape), rtol=0, atol=tolerance * scale)
 
 
-def times(*factors: Any) -> Dual:
+def times(*factors):
     """Â B̂ …: A B + ε (A B₁ + A₁ B)."""
     real, dual = split(factors[0])
     for other in factors[1:]:
@@ -147,7 +144,7 @@ def times(*factors: Any) -> Dual:
     return Dual(real, dual)
 
 
-def gives(factors: list[Any], expected: Any, tolerance: float = TIGHT) -> None:
+def gives(factors, expected, tolerance=TIGHT):
     """The product is what is expected, to a tolerance relative to the largest sum of the sizes of its terms."""
     found = times(*factors)
     sizes = times(*(Dual(*(np.abs(part) for part in split(one))) for one in factors))
@@ -156,15 +153,15 @@ def gives(factors: list[Any], expected: Any, tolerance: float = TIGHT) -> None:
         np.testing.assert_allclose(part, np.broadcast_to(other, part.shape), rtol=0, atol=atol)
 
 
-def split(a: Any) -> tuple[Array, Array]:
+def split(a):
     return (a.real, a.dual) if isinstance(a, Dual) else (a, np.zeros_like(a))
 
 
-def along(a: Dual, t: float) -> Array:
+def along(a, t):
     return a.real + t * a.dual
 
 
-def difference(function: Any, a: Dual) -> Array:
+def difference(function, a):
     """Central difference of fourth order of a function of A + t B at 0."""
     near = function(along(a, STEP)) - function(along(a, -STEP))
     far = function(along(a, 2 * STEP)) - function(along(a, -2 * STEP))
@@ -173,14 +170,14 @@ def difference(function: Any, a: Dual) -> Array:
 
 # systems
 @pytest.mark.parametrize("shape", SQUARE)
-def test_inverse(shape: tuple[int, int]) -> None:
+def test_inverse(shape):
     a = random(shape)
     gives([a, dl.inverse(a)], np.eye(shape[0]))
     gives([dl.inverse(a), a], np.eye(shape[0]))
 
 
 @pytest.mark.parametrize("shape", SQUARE)
-def test_solve_of_dual_stacks(shape: tuple[int, int]) -> None:
+def test_solve_of_dual_stacks(shape):
     a, b = random(shape), random((shape[0], 2), 1)
     gives([a, dl.solve(a, b)], b)
     vector = Dual(b.real[..., 0], b.dual[..., 0])
@@ -193,7 +190,7 @@ def test_solve_of_dual_stacks(shape: tuple[int, int]) -> None:
 
 # eigenvalues
 @pytest.mark.parametrize("n", [1, 2, 3, 6])
-def test_eigen(n: int) -> None:
+def test_eigen(n):
     a = symmetric(n)
     values, vectors = dl.eigh(a)
     spread = Dual(*(part[..., None, :] * np.eye(n) for part in split(values)))
@@ -204,7 +201,7 @@ def test_eigen(n: int) -> None:
 
 
 # where there is no dual part
-def test_singular_lanes_alone_are_nan() -> None:
+def test_singular_lanes_alone_are_nan():
     real = np.array([np.eye(3), np.diag([1.0, 1.0, 0.0]), np.full((3, 3), np.nan), 2 * np.eye(3)])
     a = Dual(real, np.ones((4, 3, 3)))
     for found in (dl.inverse(a), dl.solve(a, np.ones((4, 3, 1)))):
@@ -213,7 +210,7 @@ def test_singular_lanes_alone_are_nan() -> None:
     assert np.isnan(dl.inverse(np.zeros((2, 2))).real).all()
 
 
-def test_equal_values_have_no_derivative() -> None:
+def test_equal_values_have_no_derivative():
     """The columns concerned are NaN, the others not."""
     real, dual = np.diag([3.0, 1.0, 1.0]), np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]])
     values, vectors = dl.eigh(Dual(real, dual))
@@ -222,7 +219,7 @@ def test_equal_values_have_no_derivative() -> None:
     assert values.dual[2] == pytest.approx(1.0)
 
 
-def test_public_namespace() -> None:
+def test_public_namespace():
     """Everything by one import; the package itself loads it when it is asked for."""
     import trunnion
     from trunnion import dual

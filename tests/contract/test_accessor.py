@@ -1,41 +1,38 @@
 """`result.trunnion`: what a result of every kind says of itself; its columns, files and workbook."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
 import trunnion
+from mechanisms_parts import example
 from trunnion import MechanismError
 from trunnion.results.tables import KINDS, columns, selected
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12
 
 
-def workbooks() -> Any:
+def workbooks():
     pytest.importorskip("xlsxwriter")
     return pytest.importorskip("openpyxl")
 
 
-def result_of(name: str) -> xr.Dataset:
-    return trunnion.analyse(trunnion.read(EXAMPLES / f"{name}.yaml"), STEPS)
+def result_of(name):
+    return trunnion.analyse(example(name), STEPS)
 
 
 @pytest.fixture(scope="module", params=["durango-fourbar", "pezzuti-cardan", "fourbar-with-play", "slider-crank"])
-def result(request: pytest.FixtureRequest) -> xr.Dataset:
+def result(request):
     return result_of(request.param)
 
 
-def names(result: xr.Dataset, *wanted: str) -> list[str]:
+def names(result, *wanted):
     return [name for name, _, _ in selected(result, wanted or None)]
 
 
 @pytest.mark.spread(2)
-def test_a_group_holds_what_it_says(result: xr.Dataset) -> None:
+def test_a_group_holds_what_it_says(result):
     usual, motion, everything = names(result), names(result, "motion"), names(result, "all")
     assert everything[: len(usual)] == usual
     assert set(motion) <= set(everything)
@@ -47,7 +44,7 @@ def test_a_group_holds_what_it_says(result: xr.Dataset) -> None:
     assert {"condition", "locking_margin"} <= set(everything)
 
 
-def test_columns_are_those_of_the_dataset(result: xr.Dataset) -> None:
+def test_columns_are_those_of_the_dataset(result):
     known = {name: (unit, values) for name, unit, values in selected(result, ["all"])}
     point = str(result["point"].values[-1])
     for axis in "xy":
@@ -57,7 +54,7 @@ def test_columns_are_those_of_the_dataset(result: xr.Dataset) -> None:
     assert known["condition"][0] == "1"
 
 
-def test_every_variable_of_the_positions_is_in_a_column() -> None:
+def test_every_variable_of_the_positions_is_in_a_column():
     """By its numbers: but for those of the ground, which rests, and of freedoms that a joint has not."""
     data = result_of("durango-fourbar")
     known = [values for _, _, values in selected(data, ["all"])]
@@ -71,7 +68,7 @@ def test_every_variable_of_the_positions_is_in_a_column() -> None:
             ), name
 
 
-def test_names_and_patterns_pick_columns() -> None:
+def test_names_and_patterns_pick_columns():
     data = result_of("durango-fourbar")
     assert names(data, "A.effort", "coupler.E.*") == [
         "time", "A.effort", "coupler.E.x", "coupler.E.y", "coupler.E.velocity_x", "coupler.E.velocity_y",
@@ -81,7 +78,7 @@ def test_names_and_patterns_pick_columns() -> None:
         selected(data, ["A.efort"])
 
 
-def test_a_file_has_the_columns_asked_for(tmp_path: Path) -> None:
+def test_a_file_has_the_columns_asked_for(tmp_path):
     data = result_of("durango-fourbar")
     trunnion.save(data, tmp_path / "motion.csv", columns=["motion"])
     assert list(pd.read_csv(tmp_path / "motion.csv")) == names(data, "motion")
@@ -90,7 +87,7 @@ def test_a_file_has_the_columns_asked_for(tmp_path: Path) -> None:
     assert list(pd.read_parquet(tmp_path / "some.parquet")) == ["time", "A.effort"]
 
 
-def test_a_workbook_has_heads_units_and_numbers(tmp_path: Path) -> None:
+def test_a_workbook_has_heads_units_and_numbers(tmp_path):
     openpyxl = workbooks()
     data = result_of("durango-fourbar")
     trunnion.save(data, tmp_path / "cycle.xlsx")
@@ -105,11 +102,9 @@ def test_a_workbook_has_heads_units_and_numbers(tmp_path: Path) -> None:
     assert sheet.freeze_panes == "B3"
 
 
-def test_a_workbook_has_a_sheet_for_each_table_and_no_formula(tmp_path: Path) -> None:
+def test_a_workbook_has_a_sheet_for_each_table_and_no_formula(tmp_path):
     openpyxl = workbooks()
-    data = trunnion.tolerance(
-        trunnion.read(EXAMPLES / "toleranced-fourbar.yaml"), methods=("linear",), steps=STEPS, jobs=1
-    )
+    data = trunnion.tolerance(example("toleranced-fourbar"), methods=("linear",), steps=STEPS, jobs=1)
     data.attrs["name"] = "=1+1"
     trunnion.save(data, tmp_path / "tolerance.xlsx")
     book = openpyxl.load_workbook(tmp_path / "tolerance.xlsx")
@@ -118,17 +113,12 @@ def test_a_workbook_has_a_sheet_for_each_table_and_no_formula(tmp_path: Path) ->
     assert not any(cell.data_type == "f" for cell in cells)
 
 
-def test_positions_without_an_answer_are_empty_cells(tmp_path: Path) -> None:
+def test_positions_without_an_answer_are_empty_cells(tmp_path):
     openpyxl = workbooks()
-    longer = trunnion.read(EXAMPLES / "durango-fourbar.yaml").with_values({"AB": "2.6 m"})
-    data = trunnion.analyse(longer, 36)
+    data = trunnion.analyse(example("durango-fourbar").with_values({"AB": "2.6 m"}), 36)
     trunnion.save(data, tmp_path / "cycle.xlsx", columns=["A.effort", "status"])
     rows = list(openpyxl.load_workbook(tmp_path / "cycle.xlsx").active.iter_rows(min_row=3, values_only=True))
     assert [row[1] is None for row in rows] == np.isnan(data["drive_effort"].values[0]).tolist()
-
-
-def example(name: str) -> trunnion.Mechanism:
-    return trunnion.read(EXAMPLES / f"{name}.yaml")
 
 
 RESULTS = {
@@ -144,12 +134,12 @@ RESULTS = {
 
 
 @pytest.fixture(scope="module", params=RESULTS)
-def study(request: Any) -> Any:
+def study(request):
     return RESULTS[request.param](), request.param
 
 
 @pytest.mark.spread(2)
-def test_a_result_says_what_it_is(study: Any) -> None:
+def test_a_result_says_what_it_is(study):
     data, kind = study
     read = data.trunnion
     assert read.kind == kind == data.attrs["kind"]
@@ -161,14 +151,14 @@ def test_a_result_says_what_it_is(study: Any) -> None:
         assert table.shape[1] > 0
 
 
-def test_a_kind_of_figure_that_there_is_not_is_a_finding(study: Any) -> None:
+def test_a_kind_of_figure_that_there_is_not_is_a_finding(study):
     with pytest.raises(MechanismError) as caught:
         trunnion.plot(study[0], "no such figure")
     assert "kind" in caught.value.findings[0].where
 
 
 @pytest.mark.slow
-def test_a_result_is_written_and_read_again(study: Any, tmp_path: Path) -> None:
+def test_a_result_is_written_and_read_again(study, tmp_path):
     data, kind = study
     data.trunnion.save(tmp_path / "x.nc")
     with xr.open_dataset(tmp_path / "x.nc", decode_times=False) as again:
@@ -178,12 +168,12 @@ def test_a_result_is_written_and_read_again(study: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_every_result_has_a_report(study: Any, tmp_path: Path) -> None:
+def test_every_result_has_a_report(study, tmp_path):
     data, _ = study
     assert data.trunnion.report(tmp_path / "x.html") == (tmp_path / "x.html").read_text("utf-8")
 
 
-def test_the_summary_has_the_numbers_of_the_result() -> None:
+def test_the_summary_has_the_numbers_of_the_result():
     cycle = RESULTS["cycle"]()
     summary = {one.name: one for one in cycle.trunnion.summary}
     driver = str(cycle["driver"].values[0])
@@ -196,7 +186,7 @@ def test_the_summary_has_the_numbers_of_the_result() -> None:
     np.testing.assert_array_equal(table[f"{driver}.effort"], cycle["drive_effort"].values[0])
 
 
-def test_no_locking_margin_where_nothing_can_be_assembled() -> None:
+def test_no_locking_margin_where_nothing_can_be_assembled():
     apart = example("durango-fourbar").with_values({"BC": "0.2 m", "CD": "0.2 m"})
     result = trunnion.analyse(apart, STEPS)
     assert np.isnan(result["locking_margin"].values).all()

@@ -16,26 +16,20 @@ FOUR_BAR, TOLERANCED = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "toleranced
 LAB = [TOLERANCED, "lab/mapping.yaml"]
 # every verb
 WORK = [
-    ["check", FOUR_BAR],
-    ["analyse", FOUR_BAR, "--steps", 12, "--out", "a.csv", "--out", "a.json", "--out", "a.nc"],
-    ["design", FOUR_BAR],
-    ["locking", FOUR_BAR, "--steps", 12],
+    ["check", FOUR_BAR], ["analyse", FOUR_BAR, "--steps", 12, "--out", "a.csv", "--out", "a.json", "--out", "a.nc"],
+    ["design", FOUR_BAR], ["locking", FOUR_BAR, "--steps", 12],
     ["simulate", EXAMPLES / "flywheel-press.yaml", "--time", "0.1 s"],
     ["assemble", EXAMPLES / "misaligned-hinges.yaml", "--steps", 12],
     ["sweep", FOUR_BAR, "--over", "AB=1.9m:2.0m:2", "--steps", 12],
     ["tolerance", TOLERANCED, "--samples", 100, "--steps", 12],
     ["allocate", TOLERANCED, "--steps", 12, "--samples", 100],
-    ["play", EXAMPLES / "fourbar-with-play.yaml", "--steps", 12],
-    ["rig", TOLERANCED, "rig.yaml", "--out", "lab"],
-    ["data", "lab/mapping.yaml"],
-    ["compare", *LAB],
+    ["play", EXAMPLES / "fourbar-with-play.yaml", "--steps", 12], ["rig", TOLERANCED, "rig.yaml", "--out", "lab"],
+    ["data", "lab/mapping.yaml"], ["compare", *LAB],
     ["identify", *LAB, "--parameter", "joint_defaults.friction.coefficient"],
     ["plot", FOUR_BAR, "--kind", "torque", "--out", "torque.svg"],
-    ["report", FOUR_BAR, "--steps", 36, "--out", "report.html"],
-    ["export", FOUR_BAR, "--out", "a.glb"],
-    ["examples"],
+    ["report", FOUR_BAR, "--steps", 36, "--out", "report.html"], ["export", FOUR_BAR, "--out", "a.glb"], ["examples"],
     ["schema"],
-]
+]  # fmt: skip
 REFUSED = {
     "parquet": ["analyse", FOUR_BAR, "--out", "a.parquet"],
     "zarr": ["analyse", FOUR_BAR, "--out", "a.zarr"],
@@ -69,14 +63,14 @@ if __name__ == "__main__":
 """
 
 
-def extras() -> dict[str, list[str]]:
+def extras():
     """Packages by the extra that brings them, of those that a user installs."""
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
     return {name: [one.partition(">")[0] for one in stated[name]] for name in stated if name not in ("dev", "bench")}
 
 
 @pytest.fixture(scope="module")
-def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
+def ends(tmp_path_factory):
     """Exit status and words of every command, all in one process without the packages of extras."""
     folder = tmp_path_factory.mktemp("base")
     rig = (EXAMPLES / "rig" / "fourbar-rig.yaml").read_text("utf-8")
@@ -92,7 +86,7 @@ def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
 
 
 @pytest.mark.slow
-def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
+def test_every_verb_works(ends):
     """Findings about the mechanism (1) are none about the installation."""
     assert {words[0] for words in WORK} | {"studio", "import"} == {one.name for one in VERBS}
     for words, (code, told) in zip(WORK, ends, strict=False):
@@ -101,7 +95,7 @@ def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
 
 
 @pytest.mark.slow
-def test_what_an_extra_brings_is_asked_for_by_its_name(ends: list[tuple[int, str]]) -> None:
+def test_what_an_extra_brings_is_asked_for_by_its_name(ends):
     # SciPy writes NetCDF too, and a notebook has no command line
     assert REFUSED.keys() == extras().keys() - {"netcdf", "notebook"}
     for extra, (code, told) in zip(REFUSED, ends[len(WORK) :], strict=True):

@@ -1,7 +1,5 @@
 """A slice of the damaged files of `python -m benchmarks.fuzz`: findings or a result, nothing else, and no long wait."""
 
-from pathlib import Path
-
 import pytest
 from benchmarks.fuzz import GOOD, SHARES, run_case
 from benchmarks.fuzz_files import KINDS, originals
@@ -13,7 +11,7 @@ CASES = 240
 @pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(6))
-def test_damaged_files_are_findings(part: int, tmp_path: Path) -> None:
+def test_damaged_files_are_findings(part, tmp_path):
     """As in the benchmark, which runs tens of thousands; a machine that does much else may take longer."""
     found = [run_case(SEED, case, tmp_path, limit=60.0) for case in range(part, CASES, 6)]
     assert [one for one in found if one.outcome not in GOOD] == []
@@ -21,7 +19,7 @@ def test_damaged_files_are_findings(part: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_damaged_is_sound(tmp_path: Path) -> None:
+def test_what_is_damaged_is_sound(tmp_path):
     """Else every damage would be found, and none of what comes after it."""
     from random import Random
 

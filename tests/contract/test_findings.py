@@ -3,7 +3,6 @@
 import ast
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,16 +13,11 @@ from trunnion.results.attributes import finding_rows
 
 # place of the code
 MAKERS = {
-    "Finding.note": 0,
-    "Finding.warning": 0,
-    "Finding.error": 0,
-    "Finding.weighed": 1,
-    "draft.note": 0,
-    "draft.warn": 0,
-}
+    "Finding.note": 0, "Finding.warning": 0, "Finding.error": 0, "Finding.weighed": 1, "draft.note": 0, "draft.warn": 0,
+}  # fmt: skip
 
 
-def made() -> Iterator[tuple[str, int, ast.Call]]:
+def made():
     """Every call that makes a finding with a code: the module, the place of the code, the call."""
     for path in sorted(Path(trunnion.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -31,7 +25,7 @@ def made() -> Iterator[tuple[str, int, ast.Call]]:
                 yield path.name, place, node
 
 
-def test_every_code_is_written_out() -> None:
+def test_every_code_is_written_out():
     """So that the list of codes in the manual, which is read of the source, is whole."""
     calls = [(file, call.args[place], call) for file, place, call in made() if file not in ("errors.py", "draft.py")]
     assert len(calls) > 100
@@ -41,7 +35,7 @@ def test_every_code_is_written_out() -> None:
 
 
 @pytest.mark.parametrize("severity", Severity)
-def test_a_finding_has_code_place_and_figures(severity: Severity) -> None:
+def test_a_finding_has_code_place_and_figures(severity):
     make = {Severity.NOTE: Finding.note, Severity.WARNING: Finding.warning, Severity.ERROR: Finding.error}[severity]
     finding = make("load.not_counted", "loads.F", "this load supplies 2 J", "leave it out", work=2.0)
     assert (finding.code, finding.where, finding.severity) == ("load.not_counted", "loads.F", severity)
@@ -50,7 +44,7 @@ def test_a_finding_has_code_place_and_figures(severity: Severity) -> None:
     assert finding == Finding.weighed(severity, "load.not_counted", "loads.F", finding.what, finding.remedy, work=2.0)
 
 
-def test_figures_can_be_written_as_json() -> None:
+def test_figures_can_be_written_as_json():
     import numpy as np
 
     finding = Finding.note("a.b", "", "x", condition=np.inf, count=np.int64(3), work=np.float64(0.5))
@@ -59,7 +53,7 @@ def test_figures_can_be_written_as_json() -> None:
     assert row["figures"] == {"condition": None, "count": 3, "work": 0.5}
 
 
-def test_what_was_put_in_has_a_code_by_its_section() -> None:
+def test_what_was_put_in_has_a_code_by_its_section():
     codes = [Finding("is wrong", where).code for where in ("links.crank.mass", "--kind", "parameter x", "")]
     assert codes == ["input.links", "input.kind", "input.parameter", "input.file"]
 
@@ -76,7 +70,7 @@ RECORDED = {"Traced", "Recorded", "UntraceableError"}
 
 
 @pytest.mark.parametrize("path", [path for path in KERNELS if path not in ENTRANCES], ids=str)
-def test_a_kernel_knows_no_engine(path: Path) -> None:
+def test_a_kernel_knows_no_engine(path):
     for node in ast.walk(ast.parse((SOURCE / path).read_text("utf-8"))):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         modules = [node.module or "", *names] if isinstance(node, ast.ImportFrom) else names

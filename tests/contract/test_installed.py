@@ -7,7 +7,6 @@ import sys
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -18,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 SCRIPT = Path(__file__).with_name("every_name.py")
 
 
-def run(*command: Any, **environment: str) -> str:
+def run(*command, **environment):
     """What a command prints; the test fails with all of it where the command does."""
     kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "MYPYPATH")}
     done = subprocess.run(
@@ -30,7 +29,7 @@ def run(*command: Any, **environment: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", folder, ROOT)
     (made,) = folder.glob("*.whl")
@@ -38,13 +37,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed(wheel, tmp_path_factory):
     folder = tmp_path_factory.mktemp("installed")
     run(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", folder, wheel)
     return folder
 
 
-def test_the_script_has_every_public_name() -> None:
+def test_the_script_has_every_public_name():
     text = SCRIPT.read_text("utf-8")
     names = [f"trunnion.{name}" for name in trunnion.__all__ if name not in ("exchange", "rig")]
     names += [f"trunnion.exchange.{name}" for name in trunnion.exchange.__all__]
@@ -53,14 +52,14 @@ def test_the_script_has_every_public_name() -> None:
 
 
 @pytest.mark.slow
-def test_the_wheel_holds_what_is_read_at_run_time(wheel: Path) -> None:
+def test_the_wheel_holds_what_is_read_at_run_time(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     for name in ("py.typed", "examples/durango-fourbar.yaml", "views/web/report.js", "views/web/animation.html.j2"):
         assert f"trunnion/{name}" in names
 
 
 @pytest.mark.slow
-def test_a_strict_type_checker_sees_every_name(installed: Path, tmp_path: Path) -> None:
+def test_a_strict_type_checker_sees_every_name(installed, tmp_path):
     settings = tmp_path / "mypy.ini"
     settings.write_text("[mypy]\nstrict = true\n", encoding="utf-8")
     said = run(
@@ -74,7 +73,7 @@ def test_a_strict_type_checker_sees_every_name(installed: Path, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_it_runs_as_a_module_and_completes_in_a_shell(installed: Path, tmp_path: Path) -> None:
+def test_it_runs_as_a_module_and_completes_in_a_shell(installed, tmp_path):
     at = {"PYTHONPATH": str(installed)}
     assert trunnion.__version__ in run(sys.executable, "-m", "trunnion", "--version", **at)
     assert "durango-fourbar" in run(sys.executable, "-m", "trunnion", "examples", **at)
@@ -90,7 +89,7 @@ def test_it_runs_as_a_module_and_completes_in_a_shell(installed: Path, tmp_path:
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no browser here")
-def test_the_studio_is_served_without_node(installed: Path, tmp_path: Path) -> None:
+def test_the_studio_is_served_without_node(installed, tmp_path):
     """With nothing on the PATH: every module that the browser asks for is in the wheel, and the answers come."""
     from playwright.sync_api import sync_playwright
 

@@ -1,7 +1,6 @@
 """Every key that a joint of every pair may state changes a result, or a finding says that it does not."""
 
 import copy
-from typing import Any
 
 import numpy as np
 import pytest
@@ -47,7 +46,7 @@ VALUES = {  # two of each key, which differ
     "friction.pair_factor": (1, 1.2), "pitch": ("0.2 m", "0.21 m"),
     "stiffness.radial": ("2e6 N/m", "3e6 N/m"),
 }  # fmt: skip
-BASES: list[dict[str, Any]] = [  # beside what the key is stated: alone, with friction, with a play, with an axis off
+BASES = [  # beside what the key is stated: alone, with friction, with a play, with an axis off
     {},
     {"friction": 0.02, "pin": {"radius": "15 mm", "bearing": "50 mm"}, "guide": {"length": "0.3 m", "width": "0.1 m"}},
     {"friction": 0.02, "pin": {"radius": "15 mm"}, "guide": {"length": "0.3 m"}},
@@ -60,13 +59,13 @@ BASES: list[dict[str, Any]] = [  # beside what the key is stated: alone, with fr
 ]  # fmt: skip
 
 
-def samples() -> list[Any]:
+def samples():
     found = [pytest.param("spatial", kind, key, id=f"spatial-{kind}-{key}") for kind in PAIRS for key in VALUES]
     flat = [kind for kind in PAIRS if PAIRS[kind].planar]
     return found + [pytest.param("planar", kind, key, id=f"planar-{kind}-{key}") for kind in flat for key in VALUES]
 
 
-def test_every_key_is_tried() -> None:
+def test_every_key_is_tried():
     stated = {f"{name}.{key}" for name, part in (("pin", Pin), ("guide", Guide), ("misalignment", Misalignment))
               for key in part.model_fields}  # fmt: skip
     assert stated <= VALUES.keys()
@@ -74,12 +73,12 @@ def test_every_key_is_tried() -> None:
 
 
 @pytest.fixture(scope="module")
-def bare() -> dict[tuple[str, str], dict[str, Any]]:
+def bare():
     found = {("spatial", kind): chain(*one).data for kind, one in CHAINS.items()}
     return found | {("planar", kind): PLANAR for kind, one in PAIRS.items() if one.planar}
 
 
-def models(data: dict[str, Any], joint: str, key: str, value: Any) -> list[dict[str, Any]]:
+def models(data, joint, key, value):
     """The model with a key stated, over every base."""
     found = []
     for base in BASES:
@@ -101,28 +100,21 @@ def models(data: dict[str, Any], joint: str, key: str, value: Any) -> list[dict[
     return found
 
 
-def figures(mechanism: trunnion.Mechanism) -> np.ndarray[Any, Any]:
+def figures(mechanism):
     """At each position: what holds over the cycle, as its findings, takes far longer."""
     with np.errstate(all="ignore"):
         arrays = positions(prepare(mechanism), STEPS, margin=False, averaged=False).arrays
     names = (
-        "drive_effort",
-        "friction_power",
-        "reaction_force",
-        "joint_rotation",
-        "joint_slide",
-        "link_error",
+        "drive_effort", "friction_power", "reaction_force", "joint_rotation", "joint_slide", "link_error",
         "pin_pressure",
-    )
+    )  # fmt: skip
     return np.concatenate([arrays[name].ravel() for name in names if name in arrays])
 
 
 @pytest.mark.sample(80)
 @pytest.mark.slow
 @pytest.mark.parametrize(("space", "kind", "key"), samples())
-def test_a_key_changes_something_or_is_told(
-    space: str, kind: str, key: str, bare: dict[tuple[str, str], dict[str, Any]]
-) -> None:
+def test_a_key_changes_something_or_is_told(space, kind, key, bare):
     data = bare[space, kind]
     joint = ("D" if kind == "prismatic" else "B") if space == "planar" else "B"
     accepted = 0
@@ -144,9 +136,7 @@ def test_a_key_changes_something_or_is_told(
 @pytest.mark.parametrize("kind", ["universal", "helical"])
 @pytest.mark.parametrize("play", [{"clearance": "0.1 mm"}, {"hole_radius": "15.1 mm"}, {"cylindricity": "10 um"},
                                   {"fit": "30 mm H7/f7", "radius": None}])  # fmt: skip
-def test_a_play_that_is_not_modelled_is_refused_with_advice_that_works(
-    kind: str, play: dict[str, Any], bare: dict[tuple[str, str], dict[str, Any]]
-) -> None:
+def test_a_play_that_is_not_modelled_is_refused_with_advice_that_works(kind, play, bare):
     """Stated with the joint or by default; what is to be written in its place is accepted."""
     data = copy.deepcopy(bare["spatial", kind])
     pin = {key: value for key, value in {"radius": "15 mm", "bearing": "50 mm", **play}.items() if value}

@@ -1,8 +1,6 @@
 """Where the members of a variable have units of their own, the variable says so, and a coordinate has that of each."""
 
 import csv
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -19,7 +17,7 @@ MIXED = {"S": "N", "K": "N m"}
 COORDINATES = {"S": "m", "K": "rad"}
 
 
-def mixed(space: str) -> Mechanism:
+def mixed(space):
     """A cylinder S and a motor K, each with a driver."""
     if space == "spatial":
         return Mechanism(**draw(3, "ground =S= slide -K- hand", ("S", "K")).data)
@@ -40,7 +38,7 @@ def mixed(space: str) -> Mechanism:
     return Mechanism(**model(data))
 
 
-def of_each(variable: xr.DataArray, dim: str) -> dict[str, str]:
+def of_each(variable, dim):
     """The unit of every member, which is the coordinate's where there are several."""
     units = dict(zip(variable[dim].values.tolist(), units_along(variable, dim), strict=True))
     assert variable.attrs["units"] == " or ".join(dict.fromkeys(units.values()))
@@ -52,7 +50,7 @@ def of_each(variable: xr.DataArray, dim: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_efforts_of_mixed_drivers(space: str) -> None:
+def test_efforts_of_mixed_drivers(space):
     result = trunnion.locking(mixed(space), 6)
     for end in ("", "_lower", "_upper", "_rms", "_reverse"):
         assert of_each(result[f"drive_effort{end}"], "driver") == MIXED
@@ -61,7 +59,7 @@ def test_efforts_of_mixed_drivers(space: str) -> None:
 
 
 @pytest.mark.parametrize(("driver", "unit"), [("A", "N m"), ("C", "N")])
-def test_drivers_of_one_kind_have_one_unit_and_no_more_coordinates(driver: str, unit: str) -> None:
+def test_drivers_of_one_kind_have_one_unit_and_no_more_coordinates(driver, unit):
     data = slider_crank()
     data["drivers"] = {driver: {"speed": 0.1, "range": [0.8, 1.1]}}
     result = trunnion.analyse(Mechanism(**model(data)), 6)
@@ -69,12 +67,12 @@ def test_drivers_of_one_kind_have_one_unit_and_no_more_coordinates(driver: str, 
     assert not [name for name in result.coords if str(name).endswith("_unit")]
 
 
-def seated() -> Mechanism:
+def seated():
     """The same with its pin at a place in its hole."""
     return mixed("planar").with_values({"joints.C.seat": {"xi": 0.5}})
 
 
-def moving() -> Mechanism:
+def moving():
     data = excavator()
     data["drivers"]["S"] |= {"free": True}
     return Mechanism(**model(data))
@@ -84,7 +82,7 @@ EFFORTS = {f"drive_effort_{end}": ("driver", MIXED) for end in ("min", "max", "r
 RATES = {name: f"{unit}/s" for name, unit in COORDINATES.items()}
 MEASURES = {"push": "N", "turn": "N m", "swing": "rad"}
 PLAYED = {"effort:S": "N", "effort:K": "N m", "angle:boom": "rad"}
-STUDIES: dict[str, tuple[Callable[[], xr.Dataset], dict[str, tuple[str, dict[str, str]]]]] = {
+STUDIES = {
     "cycle": (lambda: trunnion.analyse(mixed("planar"), 6), {
         "spring_force": ("spring", {"coil": "N", "torsion": "N m"}), "measure_value": ("measure", MEASURES),
         "spring_elongation": ("spring", {"coil": "m", "torsion": "rad"}), "measure_figure": ("measure", MEASURES)}),
@@ -105,7 +103,7 @@ STUDIES: dict[str, tuple[Callable[[], xr.Dataset], dict[str, tuple[str, dict[str
 @pytest.mark.sample(15)
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("study", STUDIES)
-def test_members_have_the_units_of_each(study: str) -> None:
+def test_members_have_the_units_of_each(study):
     made, wanted = STUDIES[study]
     result = made()
     for name, (dim, units) in wanted.items():
@@ -120,8 +118,8 @@ def test_members_have_the_units_of_each(study: str) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("ending", ["nc", "zarr", "json"])
-def test_files_keep_the_unit_of_each(ending: str, tmp_path: Path) -> None:
-    readers: dict[str, Callable[[Path], xr.Dataset]] = {"nc": xr.load_dataset, "zarr": xr.open_zarr}
+def test_files_keep_the_unit_of_each(ending, tmp_path):
+    readers = {"nc": xr.load_dataset, "zarr": xr.open_zarr}
     path = tmp_path / f"x.{ending}"
     if ending == "zarr":
         pytest.importorskip("zarr")
@@ -132,7 +130,7 @@ def test_files_keep_the_unit_of_each(ending: str, tmp_path: Path) -> None:
         assert '"effort_unit"' in path.read_text()
 
 
-def test_the_units_row_has_the_unit_of_each(tmp_path: Path) -> None:
+def test_the_units_row_has_the_unit_of_each(tmp_path):
     path = tmp_path / "x.csv"
     save(trunnion.analyse(mixed("planar"), 6), path, units_row=True)
     with path.open() as file:

@@ -2,29 +2,22 @@
 
 import re
 from html import unescape
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from matplotlib import pyplot
 from test_report import Page
 
 import trunnion
+from mechanisms_parts import EXAMPLES, example
 from trunnion.views import shown as notebook
 from trunnion.views.page import hashed
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12
 
 
-def example(name: str) -> trunnion.Mechanism:
-    return trunnion.read(EXAMPLES / f"{name}.yaml")
-
-
 @pytest.fixture
-def four_bar() -> xr.Dataset:
+def four_bar():
     return trunnion.analyse(example("durango-fourbar"), STEPS)
 
 
@@ -33,7 +26,7 @@ def four_bar() -> xr.Dataset:
     ("name", "label"),
     [("durango-fourbar", "angle of A [°]"), ("five-bar-robot", "time [s]"), ("swash-plate-pump", "angle of shaft [°]")],
 )
-def test_a_plot_of_xarray_is_drawn_over_the_drive(name: str, label: str) -> None:
+def test_a_plot_of_xarray_is_drawn_over_the_drive(name, label):
     result = trunnion.analyse(example(name), STEPS)
     (line,) = result["drive_effort"].isel(driver=0).plot()
     try:
@@ -44,7 +37,7 @@ def test_a_plot_of_xarray_is_drawn_over_the_drive(name: str, label: str) -> None
         pyplot.close(line.figure)
 
 
-def read(page: str) -> tuple[set[str], str]:
+def read(page):
     """Elements and text of a page, of which every element that is opened is closed."""
     found = Page(page)
     assert not found.open
@@ -54,7 +47,7 @@ def read(page: str) -> tuple[set[str], str]:
 @pytest.mark.spread(1)
 @pytest.mark.sample(6)
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
-def test_every_example_is_shown(name: str) -> None:
+def test_every_example_is_shown(name):
     mechanism = example(name)
     elements, words = read(mechanism._repr_html_())
     known = trunnion.check(mechanism, notebook.LOOKED_AT)
@@ -72,7 +65,7 @@ def test_every_example_is_shown(name: str) -> None:
         {"drivers": {}},  # the structure does not determine the motion
     ],
 )
-def test_a_mechanism_that_cannot_be_drawn_shows_why(changed: dict[str, Any]) -> None:
+def test_a_mechanism_that_cannot_be_drawn_shows_why(changed):
     data = example("durango-fourbar").data()
     for section, entries in changed.items():
         data[section] = {**data[section], **entries} if entries else {}
@@ -81,7 +74,7 @@ def test_a_mechanism_that_cannot_be_drawn_shows_why(changed: dict[str, Any]) -> 
     assert "error" in words
 
 
-def test_names_become_no_markup(four_bar: xr.Dataset) -> None:
+def test_names_become_no_markup(four_bar):
     data = {**example("durango-fourbar").data(), "name": "<script>alert(1)</script>"}
     odd = trunnion.Mechanism(**data)
     for page in (odd._repr_html_(), trunnion.analyse(odd, 2).trunnion._repr_html_()):
@@ -99,7 +92,7 @@ def test_names_become_no_markup(four_bar: xr.Dataset) -> None:
         lambda: trunnion.play(example("fourbar-with-play"), steps=STEPS),
     ],
 )
-def test_a_result_shows_its_summary_and_findings(made: Any) -> None:
+def test_a_result_shows_its_summary_and_findings(made):
     result = made().trunnion
     _, words = read(result._repr_html_())
     assert result.kind in words
@@ -107,15 +100,15 @@ def test_a_result_shows_its_summary_and_findings(made: Any) -> None:
     assert all(one.what in words for one in result.findings[: notebook.MOST_FINDINGS])
 
 
-def test_an_animation_is_a_page_in_a_frame(four_bar: xr.Dataset, tmp_path: Path) -> None:
+def test_an_animation_is_a_page_in_a_frame(four_bar, tmp_path):
     moving = four_bar.trunnion.animate(height=500)
     frame = moving._repr_html_()
     assert read(frame)[0] == {"iframe"}
     assert 'height="500"' in frame
     assert 'sandbox="allow-scripts"' in frame
-    page = unescape(re.search(r'srcdoc="([^"]*)"', frame)[1])  # type: ignore[index]
+    page = unescape(re.search(r'srcdoc="([^"]*)"', frame)[1])
     assert page == moving.page
-    script = re.search(r'<script type="module">(.*?)</script>', page, re.DOTALL)[1]  # type: ignore[index]
+    script = re.search(r'<script type="module">(.*?)</script>', page, re.DOTALL)[1]
     assert f"script-src '{hashed(script)}'" in page
     assert not re.search(r"""(?:src|href)=["'](?!data:,)""", page)  # nothing is fetched
     assert moving.save(tmp_path / "motion.html").read_text(encoding="utf-8") == page

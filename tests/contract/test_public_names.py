@@ -3,9 +3,6 @@
 import inspect
 import subprocess
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,7 +10,7 @@ import trunnion
 from mechanisms import MODELS
 from trunnion.accessor import Accessor
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {
+FUNCTIONS = {
     **{name: getattr(trunnion, name) for name in trunnion.__all__ if inspect.isroutine(getattr(trunnion, name))},
     **{
         f"rig.{name}": getattr(trunnion.rig, name)
@@ -28,15 +25,15 @@ OTHERWISE = {
 }
 
 
-def test_the_names_fit_one_page() -> None:
+def test_the_names_fit_one_page():
     assert len(trunnion.__all__) <= 20
     assert all(hasattr(trunnion, name) for name in trunnion.__all__)
     assert set(dir(trunnion)) == {*trunnion.__all__, "__version__"}
 
 
-def test_an_argument_is_the_same_in_every_function() -> None:
+def test_an_argument_is_the_same_in_every_function():
     """The same name has the same meaning: one annotation and one default."""
-    seen: dict[str, tuple[str, str, Any]] = {}
+    seen = {}
     for function, made in FUNCTIONS.items():
         for name, one in inspect.signature(made).parameters.items():
             if one.kind is inspect.Parameter.VAR_KEYWORD or (function, name) in OTHERWISE:
@@ -46,7 +43,7 @@ def test_an_argument_is_the_same_in_every_function() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
-def test_a_public_function_is_typed_and_told(name: str) -> None:
+def test_a_public_function_is_typed_and_told(name):
     """Every argument has a type and a word in the docstring; what can be wrong with it is said there."""
     signature = inspect.signature(FUNCTIONS[name])
     told = inspect.getdoc(FUNCTIONS[name]) or ""
@@ -68,7 +65,7 @@ METHODS = {
 
 
 @pytest.mark.parametrize("name", [*sorted(FUNCTIONS), *sorted(METHODS), "FrictionMethod"])
-def test_an_unknown_keyword_names_the_nearest(name: str) -> None:
+def test_an_unknown_keyword_names_the_nearest(name):
     public = {**FUNCTIONS, **METHODS, "FrictionMethod": trunnion.FrictionMethod}[name]
     parameters = inspect.signature(public).parameters.values()
     known = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD and one.name not in ("self", "cls")]
@@ -82,18 +79,18 @@ def test_an_unknown_keyword_names_the_nearest(name: str) -> None:
 
 
 @pytest.mark.parametrize("model", ["durango-fourbar", "rssr"])
-def test_friction_is_not_switched_off_by_a_keyword(model: str) -> None:
+def test_friction_is_not_switched_off_by_a_keyword(model):
     mechanism = trunnion.read(f"examples/{model}.yaml")
     for verb in (trunnion.analyse, trunnion.sweep, trunnion.tolerance, trunnion.allocate, trunnion.rig.compare):
         with pytest.raises(TypeError, match=r"give it mechanism.with_friction\('off'\)"):
             verb(mechanism, friction="off")
     with pytest.raises(TypeError, match=r"takes FrictionMethod.*; mechanism.with_friction\('off'\)"):
-        trunnion.analyse(mechanism, friction_method="off")  # type: ignore[arg-type]
+        trunnion.analyse(mechanism, friction_method="off")
     with pytest.raises(trunnion.MechanismError, match="no method 'off'"):
-        trunnion.FrictionMethod("off")  # type: ignore[arg-type]
+        trunnion.FrictionMethod("off")
 
 
-WRONG: dict[str, tuple[Callable[[trunnion.Mechanism], Any], type[Exception], str]] = {
+WRONG = {
     "a text for a number": (lambda m: trunnion.analyse(m, steps="9"), TypeError, r"analyse\(steps='9'\) takes int"),
     "a broken count": (lambda m: trunnion.locking(m, 2.5), TypeError, r"locking\(steps=2.5\) takes int"),
     "a truth value for a count": (lambda m: trunnion.tolerance(m, seed=True), TypeError, "takes int"),
@@ -127,21 +124,21 @@ WRONG: dict[str, tuple[Callable[[trunnion.Mechanism], Any], type[Exception], str
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_argument_is_refused_by_name(name: str) -> None:
+def test_a_wrong_argument_is_refused_by_name(name):
     call, kind, words = WRONG[name]
     with pytest.raises(kind, match=words):
         call(trunnion.read("examples/toleranced-fourbar.yaml"))
 
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
-def test_nothing_is_no_mechanism_and_no_file(name: str) -> None:
+def test_nothing_is_no_mechanism_and_no_file(name):
     """Every public function checks its arguments."""
     with pytest.raises(TypeError, match=r"\(.*=None\) takes "):
         FUNCTIONS[name](None)
 
 
 @pytest.mark.parametrize("keyword", [{"columns": ["all"]}, {"units_row": True}, {"units": "model"}])
-def test_what_is_said_of_a_file_needs_one(keyword: dict[str, Any], tmp_path: Path) -> None:
+def test_what_is_said_of_a_file_needs_one(keyword, tmp_path):
     mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
     with pytest.raises(trunnion.MechanismError, match="no effect without a file"):
         trunnion.analyse(mechanism, 6, **keyword)
@@ -150,13 +147,13 @@ def test_what_is_said_of_a_file_needs_one(keyword: dict[str, Any], tmp_path: Pat
 
 
 @pytest.mark.parametrize("verb", ["check", "analyse", "locking"])
-def test_progress_is_told_to_the_end(verb: str) -> None:
-    done: list[int] = []
+def test_progress_is_told_to_the_end(verb):
+    done = []
     getattr(trunnion, verb)(trunnion.Mechanism(**MODELS["four-bar"]()), 6, progress=done.append)
     assert done[-1] == 6
 
 
-def test_importing_the_package_loads_nothing() -> None:
+def test_importing_the_package_loads_nothing():
     script = "import sys, trunnion, trunnion.rig; print(len({'numpy', 'xarray', 'pydantic'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "0"

@@ -1,7 +1,5 @@
 """Every entry of every table keeps its table's promise; a new entry is tested by being there."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
-from trunnion.joints.contact_loads import ContactLoad, GuideLoad, PinLoad
+from trunnion.joints.contact_loads import GuideLoad, PinLoad
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 
@@ -18,7 +16,7 @@ slips = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-9)
 components = st.floats(-1e4, 1e4)
 
 
-def parameters(name: str) -> dict[str, Any]:
+def parameters(name):
     """A value for every parameter of a law, inside its range."""
     found = {}
     for key, declared in FRICTION_LAWS[name].parameters.items():
@@ -30,7 +28,7 @@ def parameters(name: str) -> dict[str, Any]:
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("name", FRICTION_LAWS)
 @given(loads, slips)
-def test_law_is_odd_and_dissipative(name: str, normal: float, slip: float) -> None:
+def test_law_is_odd_and_dissipative(name, normal, slip):
     function, given_ = FRICTION_LAWS[name].function, parameters(name)
     force = function(normal, slip, **given_)
     assert function(normal, -slip, **given_) == -force
@@ -41,14 +39,14 @@ def test_law_is_odd_and_dissipative(name: str, normal: float, slip: float) -> No
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("name", FRICTION_LAWS)
 @given(slips)
-def test_law_is_zero_at_zero_load_and_grows_with_it(name: str, slip: float) -> None:
+def test_law_is_zero_at_zero_load_and_grows_with_it(name, slip):
     function, given_ = FRICTION_LAWS[name].function, parameters(name)
     assert function(0.0, slip, **given_) == 0
     assert np.all(np.diff(np.abs([function(n, slip, **given_) for n in (1.0, 2.0, 50.0)])) >= 0)
 
 
 @pytest.mark.parametrize("name", FRICTION_LAWS)
-def test_law_takes_arrays_and_duals(name: str) -> None:
+def test_law_takes_arrays_and_duals(name):
     """(sample, position) broadcasting, and the derivative by load and every parameter against differences."""
     function, given_ = FRICTION_LAWS[name].function, parameters(name)
     normal, slip = np.linspace(1, 9, 5), np.array([-2.0, -0.1, 0.1, 0.7, 3.0])
@@ -69,7 +67,7 @@ def test_law_takes_arrays_and_duals(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PAIRS)
-def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
+def test_a_pair_about_one_axis_can_be_driven(name):
     """What can be driven, resisted and sprung is what moves about or along one axis; its first motion is driven."""
     pair = PAIRS[name]
     assert pair.one_axis == bool(pair.motions)
@@ -77,16 +75,16 @@ def test_a_pair_about_one_axis_can_be_driven(name: str) -> None:
     assert not (pair.turns and pair.guided)
 
 
-def load_of(turn: float | None) -> ContactLoad:
+def load_of(turn):
     return PinLoad() if turn is None else GuideLoad((-np.sin(turn), np.cos(turn)), 0.37)
 
 
-def normal_of(load: ContactLoad, *reaction: float) -> float:
+def normal_of(load, *reaction):
     return float(load.normal(load.felt(reaction)))
 
 
 @given(st.one_of(st.none(), st.floats(-3, 3)), components, components, components, st.floats(0.01, 50))
-def test_normal_load(turn: float | None, x: float, y: float, m: float, factor: float) -> None:
+def test_normal_load(turn, x, y, m, factor):
     """N ≥ 0, the same for the opposite reaction, and proportional to it."""
     load = load_of(turn)
     normal = normal_of(load, x, y, m)
@@ -102,7 +100,7 @@ def test_normal_load(turn: float | None, x: float, y: float, m: float, factor: f
 
 
 @given(st.one_of(st.none(), st.floats(-3, 3)), st.lists(components, min_size=6, max_size=6))
-def test_bound_of_the_normal_load(turn: float | None, numbers: list[float]) -> None:
+def test_bound_of_the_normal_load(turn, numbers):
     """|N(R + δ) − N(R)| ≤ bound(δ): the certificate for a unique solution rests on it."""
     load, one, change = load_of(turn), np.array(numbers[:3]), np.array(numbers[3:])
     difference = normal_of(load, *(one + change)) - normal_of(load, *one)
@@ -110,7 +108,7 @@ def test_bound_of_the_normal_load(turn: float | None, numbers: list[float]) -> N
 
 
 @given(st.one_of(st.none(), st.floats(-3, 3)), components, components, components)
-def test_gradient_of_the_normal_load(turn: float | None, x: float, y: float, m: float) -> None:
+def test_gradient_of_the_normal_load(turn, x, y, m):
     """Against the dual part of N, wherever N has one."""
     load = load_of(turn)
     felt = load.felt((x, y, m))
@@ -134,7 +132,7 @@ wrenches = st.tuples(st.tuples(*[felt] * 3), st.tuples(*[felt] * 3))
 
 
 @pytest.mark.parametrize(("space", "kind"), PLAYS)
-def test_play_of_a_pair(space: str, kind: str) -> None:
+def test_play_of_a_pair(space, kind):
     """Of a kind of pair there is; ends with a number and axes of their own; a length wherever two ends lie apart."""
     play = CLEARANCE_MODELS[space][kind]
     assert PAIRS[kind].planar or space == "spatial"
@@ -153,7 +151,7 @@ def test_play_of_a_pair(space: str, kind: str) -> None:
     assert play.offsets(some, "seats.A") == [tuple(some.get(f"seats.A.{key}", 0.0) for key in end) for end in play.ends]
 
 
-def shift_numbers(shift: Any) -> tuple[np.ndarray, np.ndarray]:
+def shift_numbers(shift):
     """Rotation matrix and place of a shift, in the plane as in space."""
     if not isinstance(shift[0], tuple):
         x, y, c, s = (float(n) for n in shift)
@@ -164,7 +162,7 @@ def shift_numbers(shift: Any) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "kind"), PLAYS)
 @given(st.integers(0, 10**6), st.floats(1e-6, 1e-2), st.floats(0.02, 1.0))
-def test_shift_stays_within_the_clearance(space: str, kind: str, seed: int, rho: float, length: float) -> None:
+def test_shift_stays_within_the_clearance(space, kind, seed, rho, length):
     """A rotation and a place: none without offsets, no farther than ρ, tilted no more than 2ρ/H along each axis."""
     play, rng = CLEARANCE_MODELS[space][kind], np.random.default_rng(seed)
     offsets = []
@@ -184,19 +182,17 @@ def test_shift_stays_within_the_clearance(space: str, kind: str, seed: int, rho:
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("space", "kind"), PLAYS)
 @given(wrenches, wrenches, st.floats(0.02, 1.0), st.floats(-50, 50), st.integers(0, 10**6))
-def test_seat_and_worst_case(
-    space: str, kind: str, one: Any, other: Any, length: float, factor: float, seed: int
-) -> None:
+def test_seat_and_worst_case(space, kind, one, other, length, factor, seed):
     """Loads at the ends are linear in force and moment; the worst case is the support function of the play: even,
     homogeneous, subadditive, attained by the seat and by no other place; the seat is odd.
     """
     play, rng = CLEARANCE_MODELS[space][kind], np.random.default_rng(seed)
     radii = rng.uniform(1e-6, 1e-3, len(play.ends))
 
-    def loads(wrench: Any) -> list[np.ndarray]:
+    def loads(wrench):
         return [np.array(load, float) for load in play.loads(*(tuple(part) for part in wrench), length)]
 
-    def most(wrench: Any) -> float:
+    def most(wrench):
         return float(worst_case([tuple(load) for load in loads(wrench)], radii))
 
     size = 1e-12 * (np.abs(one).max() + np.abs(other).max()) / length * max(1.0, abs(factor))

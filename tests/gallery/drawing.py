@@ -5,13 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import fsolve
 
-from gallery.entry import STEPS, Entry, Outcome, corner
-
-
-# peaucellier: the pen stays on x = (L² − m²)/(2r)
-def stray(one: Outcome) -> float:
-    x, _ = one.track("side-CE.pen")
-    return float(np.abs(x - (0.25**2 - 0.1**2) / (2 * 0.16)).max())
+from gallery.entry import STEPS, Entry, corner
 
 
 # jansen: the foot by seven triangles
@@ -28,10 +22,6 @@ def jansen_foot(turn: Any) -> Any:
 def turns(start: float) -> Any:
     """Crank angles of the outcome's positions."""
     return start + 2 * np.pi * np.arange(STEPS) / STEPS
-
-
-def stride(one: Outcome) -> float:
-    return float(np.ptp(one.track("shank.foot")[0]))
 
 
 # klann: the foot by the lengths between pins
@@ -62,12 +52,14 @@ def klann_foot(turn: Any) -> Any:
 
 ENTRIES = {
     "peaucellier": Entry(
-        says="Farthest that the pen strays from a straight line", unit="m", tolerance=2e-13, found=stray,
-        expected=lambda: 0.0, source="Peaucellier's x = (L² − m²) / (2 r)",
+        says="Farthest that the pen strays from a straight line", unit="m", tolerance=2e-13, expected=lambda: 0.0,
+        found=lambda one: float(abs(one.track("side-CE.pen")[0] - (0.25**2 - 0.1**2) / (2 * 0.16)).max()),
+        source="Peaucellier's x = (L² − m²) / (2 r)",
     ),
     "jansen": Entry(
         says="Length of the foot's step, by positions 5° apart", unit="m", tolerance=1e-12,
-        figures=("mechanism", "torque"), found=stride, expected=lambda: float(np.ptp(jansen_foot(turns(np.pi)).real)),
+        figures=("mechanism", "torque"), found=lambda one: float(np.ptp(one.track("shank.foot")[0])),
+        expected=lambda: float(np.ptp(jansen_foot(turns(np.pi)).real)),
         source="intersecting circles, from the crank to the foot",
     ),
     "klann": Entry(

@@ -11,18 +11,12 @@ from gallery import benchmarks, drawing, four_bars, in_time, presses, several_lo
 from gallery.entry import Entry
 
 SECTIONS: Mapping[str, Mapping[str, Entry]] = {
-    "Four-bars": four_bars.ENTRIES,
-    "Linkages with slides": sliders.ENTRIES,
-    "Several loops": several_loops.ENTRIES,
-    "Straight lines and walking legs": drawing.ENTRIES,
-    "Gears": several_loops.GEARED,
-    "Presses": presses.ENTRIES,
-    "Moved by motors and weights": in_time.ENTRIES,
-    "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
-    "In space": spatial.ENTRIES,
-    "With play and misaligned axes": toleranced.PLAYED,
+    "Four-bars": four_bars.ENTRIES, "Linkages with slides": sliders.ENTRIES, "Several loops": several_loops.ENTRIES,
+    "Straight lines and walking legs": drawing.ENTRIES, "Gears": several_loops.GEARED, "Presses": presses.ENTRIES,
+    "Moved by motors and weights": in_time.ENTRIES, "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
+    "In space": spatial.ENTRIES, "With play and misaligned axes": toleranced.PLAYED,
     "With tolerances": toleranced.ENTRIES,
-}
+}  # fmt: skip
 ENTRIES: Mapping[str, Entry] = {name: entry for section in SECTIONS.values() for name, entry in section.items()}
 
 # Examples that are there for their diagnosis: what the finding says that keeps them from being analysed.

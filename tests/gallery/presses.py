@@ -46,16 +46,16 @@ def jaw_angle(turn: Any) -> Any:
     return np.angle(corner(front, 0, 0.45, abs(seat), 1) / seat)
 
 
-def turning_points() -> tuple[float, float]:
-    """Least and greatest rotation of the jaw, rad."""
+def stroke_by_hand() -> float:
+    """From the least and the greatest rotation of the jaw, rad."""
     grid = 2 * np.pi * np.arange(72) / 72
-    ends = []
+    turned = 0.0
     for sign in (1.0, -1.0):
         near = grid[np.argmin(sign * jaw_angle(grid))]
         best = minimize_scalar(lambda q, sign=sign: sign * jaw_angle(q), bounds=(near - 0.1, near + 0.1),
                                method="bounded", options={"xatol": 1e-9})  # fmt: skip
-        ends.append(sign * best.fun)
-    return ends[0], ends[1]
+        turned -= best.fun
+    return float(2 * np.hypot(0.06, 1.26) * np.sin(turned / 2))
 
 
 def stroke(one: Outcome) -> float:
@@ -66,18 +66,7 @@ def stroke(one: Outcome) -> float:
     return float(np.hypot(np.ptp(x), np.ptp(y)))
 
 
-def stroke_by_hand() -> float:
-    low, high = turning_points()
-    return float(2 * np.hypot(0.06, 1.26) * np.sin((high - low) / 2))
-
-
 # flywheel-press: how the motor starts it
-def start_of(one: Outcome) -> float:
-    """Acceleration of the crank at the start, without friction."""
-    smooth = trunnion.simulate(one.mechanism.with_friction("off"), 1e-3, 1)
-    return float(smooth["joint_rotation_acceleration"].sel(joint="O").values[0])
-
-
 def start_by_hand() -> float:
     """i η T over the inertias, at the dead centre: of the crank, of the rotor by i² η, of the rod."""
     standstill = 2 * 60 / (1 / 0.2 + 0.2)
@@ -88,7 +77,9 @@ def start_by_hand() -> float:
 ENTRIES = {
     "flywheel-press": Entry(
         says="Acceleration of the crank as the motor starts it, without friction", unit="rad/s^2", tolerance=1e-9,
-        figures=("mechanism", "torque"), found=start_of, expected=start_by_hand,
+        figures=("mechanism", "torque"), expected=start_by_hand,
+        found=lambda one: float(trunnion.simulate(one.mechanism.with_friction("off"), 1e-3, 1)
+                                ["joint_rotation_acceleration"].sel(joint="O")[0]),
         source="Kloss's torque at standstill over the inertias at the dead centre",
     ),
     "toggle-press": Entry(

@@ -6,16 +6,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import fsolve
 
-from gallery.entry import STEPS, Entry, Outcome, corner
+from gallery.entry import STEPS, Entry, corner
 
 
-# indexing-press: lift of the punch
-def lift(one: Outcome) -> float:
-    """Over the whole cycle: the ram is at rest at both its ends, so that the grid has them."""
-    y = one.track("punch.P")[1]
-    return float(y.max() - y.min())
-
-
+# indexing-press: lift of the punch; the ram is at rest at both its ends, so that the grid has them
 def lift_by_hand() -> float:
     """Knee A between O and the rod's pin D, punch B below it on the y axis; at both ends of the ram."""
 
@@ -46,10 +40,6 @@ def closed(loops: Loops, crank: Any, guess: tuple[float, ...]) -> Any:
 FINE = 720
 
 
-def swing_of_agitator(one: Outcome) -> float:
-    return float(np.ptp(one.over(FINE).angle("agitator")))
-
-
 def swing_of_watt() -> float:
     """Unknown: directions of coupler, C from D, rod, agitator."""
 
@@ -63,13 +53,8 @@ def swing_of_watt() -> float:
     return float(np.ptp(found[:, 3]))
 
 
-def rest(one: Outcome) -> float:
-    """How far the output turns while the crank goes from 120° to 240°; the cycle begins at 90°."""
-    return float(np.ptp(one.angle("output")[6:31]))
-
-
 def rest_of_stephenson() -> float:
-    """Unknown: directions of B from C, C from D, rod, output."""
+    """Unknown: directions of B from C, C from D, rod, output. The cycle begins at 90°."""
 
     def loops(crank: complex, u: Any) -> tuple[complex, complex]:
         coupler, rocker, rod, output = u
@@ -84,23 +69,21 @@ def rest_of_stephenson() -> float:
 
 ENTRIES = {
     "indexing-press": Entry(
-        says="Lift of the punch", unit="m", tolerance=1e-12, figures=("mechanism", "motion"), found=lift,
-        expected=lift_by_hand, source="intersecting circles at both ends of the ram",
+        says="Lift of the punch", unit="m", tolerance=1e-12, figures=("mechanism", "motion"),
+        found=lambda one: float(np.ptp(one.track("punch.P")[1])), expected=lift_by_hand,
+        source="intersecting circles at both ends of the ram",
     ),
     "watt-six-bar": Entry(
         says="Swing of the agitator", unit="rad", tolerance=1e-10, figures=("mechanism", "motion"),
-        found=swing_of_agitator, expected=swing_of_watt, source="closing both loops with scipy's fsolve",
+        found=lambda one: float(np.ptp(one.over(FINE).angle("agitator"))), expected=swing_of_watt,
+        source="closing both loops with scipy's fsolve",
     ),
     "stephenson-six-bar": Entry(
         says="Turn of the output from 120° to 240° of the crank", unit="rad", tolerance=1e-10,
-        figures=("mechanism", "motion"), found=rest, expected=rest_of_stephenson,
-        source="closing both loops with scipy's fsolve",
+        figures=("mechanism", "motion"), found=lambda one: float(np.ptp(one.angle("output")[6:31])),
+        expected=rest_of_stephenson, source="closing both loops with scipy's fsolve",
     ),
 }  # fmt: skip
-
-
-def tool_height(one: Outcome) -> float:
-    return float(np.ptp(one.track("left.tool")[1]))
 
 
 def expected_height() -> float:
@@ -111,18 +94,15 @@ def expected_height() -> float:
     return float(np.ptp(tool.imag))
 
 
-def off_the_line(one: Outcome) -> float:
-    return float(np.abs(one.track("pinion.rod")[1]).max())
-
-
 GEARED = {
     "geared-five-bar": Entry(
         says="Height of the tool's path, by positions 10° of the crank apart", unit="m", tolerance=1e-12,
-        found=tool_height, expected=expected_height,
+        found=lambda one: float(np.ptp(one.track("left.tool")[1])), expected=expected_height,
         source="circle intersection for half the angle at the second crank",
     ),
     "cardan-gears": Entry(
-        says="Farthest that the rod's pin strays from the diameter", unit="m", tolerance=1e-15, found=off_the_line,
-        expected=lambda: 0.0, source="La Hire's theorem: a hypocycloid of two cusps is a diameter",
+        says="Farthest that the rod's pin strays from the diameter", unit="m", tolerance=1e-15,
+        found=lambda one: float(np.abs(one.track("pinion.rod")[1]).max()), expected=lambda: 0.0,
+        source="La Hire's theorem: a hypocycloid of two cusps is a diameter",
     ),
 }  # fmt: skip

@@ -26,8 +26,7 @@ def at(one: Outcome, quantity: str, name: str, degrees: float) -> float:
 
 def ratio(one: Outcome, driven: str, driver: str) -> Any:
     """Speed of one joint over that of another."""
-    name = "joint_rotation_velocity"
-    return joint(one, name, driven) / joint(one, name, driver)
+    return joint(one, "joint_rotation_velocity", driven) / joint(one, "joint_rotation_velocity", driver)
 
 
 def closed(rows: Sequence[Row], first: float, guess: Sequence[float]) -> Any:
@@ -120,12 +119,6 @@ def rocker_on_the_sphere(crank: float) -> float:
     return elliptic(a, b, c2 + s1 * np.cos(crank) * s4 * c3 - c1 * c4 * c3, -1)
 
 
-# rssp, swash-plate-pump, sarrus: strokes
-def stroke_by_pythagoras() -> float:
-    r, rod, d = 0.04, 0.26, 0.12
-    return float(np.sqrt(rod**2 - (d - r) ** 2) - np.sqrt(rod**2 - (d + r) ** 2))
-
-
 def off_the_straight_line(one: Outcome) -> float:
     """Of the middle of Sarrus' platform from its height a sin φ + √(b² − a² cos² φ) straight above the base, m."""
     place = one.result["point_position"].sel(point="platform.middle").transpose("axis", "position").values
@@ -134,18 +127,7 @@ def off_the_straight_line(one: Outcome) -> float:
     return float(np.abs(place - [0 * height, 0 * height, height]).max())
 
 
-# bennett
-def bennett_tangents(one: Outcome) -> float:
-    """tan(θ_A/2) tan(θ_B/2) at 60°."""
-    return float(np.prod([np.tan(at(one, "joint_rotation", name, 60) / 2) for name in "AB"]))
-
-
 # tilting-gudgeon-pin: when its first end strikes
-def strikes(one: Outcome) -> float:
-    """s."""
-    return float(trunnion.simulate(one.mechanism, 3e-4, 1)["impact_begin"][0])
-
-
 def strikes_by_hand() -> float:
     """The rod turns about the ball that the crank moves, by Euler's equations, and the piston goes on as it went, until
     the pin is at the wall of one end of its hole."""
@@ -220,7 +202,8 @@ ENTRIES = {
         source="the one equation that the length of the rod leaves",
     ),
     "rssp": Entry(
-        says="Stroke of the ram", unit="m", tolerance=1e-14, found=stroke("D"), expected=stroke_by_pythagoras,
+        says="Stroke of the ram", unit="m", tolerance=1e-14, found=stroke("D"),
+        expected=lambda: float(np.sqrt(0.26**2 - (0.12 - 0.04) ** 2) - np.sqrt(0.26**2 - (0.12 + 0.04) ** 2)),
         source="the closed form √(l² − (d − r)²) − √(l² − (d + r)²)",
     ),
     "swash-plate-pump": Entry(
@@ -234,12 +217,13 @@ ENTRIES = {
     ),
     "tilting-gudgeon-pin": Entry(
         says="When the first end of the gudgeon pin strikes the wall of its hole", unit="s", tolerance=1e-8,
-        found=strikes, expected=strikes_by_hand,
+        found=lambda one: float(trunnion.simulate(one.mechanism, 3e-4, 1)["impact_begin"][0]), expected=strikes_by_hand,
         source="Euler's equations of the rod about the ball on the crank, integrated on their own (SciPy)",
     ),
     "bennett": Entry(
         says="tan(θ/2) of the crank times that of the coupler, the same at every position", unit="1", tolerance=1e-12,
-        found=bennett_tangents, expected=lambda: float(np.sin(np.radians(80)) / np.sin(np.radians(30))),
+        found=lambda one: float(np.prod([np.tan(at(one, "joint_rotation", name, 60) / 2) for name in "AB"])),
+        expected=lambda: float(np.sin(np.radians(80)) / np.sin(np.radians(30))),
         source="Bennett's closed form sin ½(β + α)/sin ½(β − α)",
     ),
     "sarrus": Entry(

@@ -1,37 +1,34 @@
 """Every example is read, checked and analysed, and its fact of the gallery holds."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import trunnion
 from gallery.entry import STEPS, Outcome
 from gallery.facts import ENTRIES, REFUSED
+from mechanisms_parts import EXAMPLES, example
 from trunnion import Status
 from trunnion.errors import MechanismError, Severity
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
-
-def test_every_example_has_an_entry() -> None:
+def test_every_example_has_an_entry():
     assert sorted([*ENTRIES, *REFUSED]) == sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 
 
 @pytest.mark.spread(18)
 @pytest.mark.parametrize("name", [*ENTRIES, *REFUSED])
-def test_every_example_has_a_name_and_notes(name: str) -> None:
-    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+def test_every_example_has_a_name_and_notes(name):
+    mechanism = example(name)
     assert mechanism.name
     assert mechanism.notes.strip().endswith("."), "the gallery shows the notes: give a sentence or two"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENTRIES)
-def test_example(name: str) -> None:
+def test_example(name):
     """No error but those of the entry, no position without forces but those of the entry, and the fact."""
     entry = ENTRIES[name]
-    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    mechanism = example(name)
     errors = [str(one) for one in trunnion.check(mechanism, STEPS).findings if one.severity is Severity.ERROR]
     assert not [error for error in errors if not any(part in error for part in entry.errors)]
     result = trunnion.analyse(mechanism, STEPS)
@@ -42,9 +39,9 @@ def test_example(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
-def test_refused(name: str) -> None:
+def test_refused(name):
     """It is checked, its diagnosis is an error, and it is not analysed."""
-    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    mechanism = example(name)
     errors = [one.what for one in trunnion.check(mechanism, STEPS).findings if one.severity is Severity.ERROR]
     assert len(errors) == 1
     assert REFUSED[name] in errors[0]

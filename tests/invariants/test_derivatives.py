@@ -1,12 +1,9 @@
 """Dual numbers through a whole analysis equal central differences, for every output by every number of the model."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 import pytest
 
-from mechanisms import MODELS, Array, Data, build, four_bar, law_named
+from mechanisms import MODELS, build, four_bar, law_named
 from mechanisms_parts import bare
 from trunnion import FrictionMethod
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -18,7 +15,7 @@ POSITIONS = 7
 METHOD = FrictionMethod("newton", 1e-11)
 
 
-def outputs(back: Any) -> Iterator[tuple[str, Any]]:
+def outputs(back):
     """Every number a walk there and back finds, by name."""
     for link, motion in back.walk.motions.items():
         for part, group in zip(("place", "speed", "acceleration"), motion, strict=True):
@@ -34,7 +31,7 @@ def outputs(back: Any) -> Iterator[tuple[str, Any]]:
     yield "power of weight and inertia", back.body_power
 
 
-def varied(run: Any, paths: list[str], part: Any) -> dict[str, Any]:
+def varied(run, paths, part):
     """Values in which sample i has its path i replaced by part(nominal value, row of zeros and a one)."""
     mechanism = run.system.mechanism
     replaced = {path: part(run.values[path], np.eye(len(paths))[:, [i]]) for i, path in enumerate(paths)}
@@ -50,7 +47,7 @@ CASES = [
 @pytest.mark.sample(10)
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "friction"), CASES)
-def test_duals_equal_central_differences(name: str, friction: float | Data | None) -> None:
+def test_duals_equal_central_differences(name, friction):
     """To 1e-7 of the largest derivative or value per step-scale: sixth-order differences, all numbers at once."""
     run = prepare(build(MODELS[name](), friction=friction, radius=0.03))
     paths = [path for path in run.values if not path.startswith(("assembly.", "joint_defaults."))]
@@ -86,14 +83,14 @@ def test_duals_equal_central_differences(name: str, friction: float | Data | Non
 
 
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III"])
-def test_nested_duals_give_second_derivatives(name: str) -> None:
+def test_nested_duals_give_second_derivatives(name):
     """∂²/∂p∂q by depth 2 equals the difference of first derivatives."""
     run = prepare(build(MODELS[name](), radius=0.03))
     time = np.array([0.21, 0.63]) * run.cycle.duration
     p, q = "links.crank.points.B.x", "joints.B.friction.coefficient"
     vp, vq = run.values[p], run.values[q]
 
-    def first(shift: Array) -> dict[str, Array]:
+    def first(shift):
         values = run.system.mechanism.parameters({p: Dual(vp + shift[0], 1.0), q: vq + shift[1]})
         return {key: derivative(number) for key, number in outputs(run.solve(time, values, METHOD))}
 
@@ -112,7 +109,7 @@ def test_nested_duals_give_second_derivatives(name: str) -> None:
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * scale, err_msg=f"{output} by {other}")
 
 
-def test_a_pin_without_load_has_a_derivative_of_zero() -> None:
+def test_a_pin_without_load_has_a_derivative_of_zero():
     """An unloaded dyad does not spoil the derivatives of the rest."""
     data = bare(four_bar()) | {"gravity": [0, 0], "loads": {"m": {"link": "crank", "moment": -5.0}}}
     run = prepare(build(data, friction=0.1, radius=0.01))

@@ -1,15 +1,13 @@
 """What holds of every motion in time: machine code equals walks, where it ends and why, bad numbers are refused."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.special import ellipk
 
 from brief import brief
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from playing import rattling
 from timed import (
     ANTIPARALLELOGRAM,
@@ -24,7 +22,7 @@ from timed import (
     two_wheels,
     wheel,
 )  # fmt: skip
-from trunnion import MechanismError, Status, analyse, read, simulate
+from trunnion import MechanismError, Status, analyse, simulate
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.rates import Walks
@@ -33,8 +31,7 @@ from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-LAWS: dict[str, Any] = {
+LAWS = {
     "coulomb": 0.1,
     "stribeck": {"law": "stribeck", "coefficient": 0.08, "static": 0.12, "stribeck_speed": 0.05, "viscous": 0.1},
     "brown-mcphee": {"law": "brown-mcphee", "coefficient": 0.08, "static": 0.12, "transition_speed": 0.01},
@@ -44,7 +41,7 @@ LAWS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def compared(mechanism: Mechanism, lanes: int = 5) -> None:
+def compared(mechanism, lanes=5):
     """Machine code against walks at random states."""
     motion = FreeMotion.of(prepare(mechanism))
     compiled = CompiledRates(motion)
@@ -68,18 +65,18 @@ def compared(mechanism: Mechanism, lanes: int = 5) -> None:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("law", LAWS)
-def test_machine_code_is_what_walks_find(law: str) -> None:
+def test_machine_code_is_what_walks_find(law):
     compared(
         slider_crank(LAWS[law], springs={"damper": {"joint": "S", "stiffness": 200, "free_length": 0.1, "damping": 30}})
     )
 
 
-def test_near_locking_machine_code_is_what_walks_find() -> None:
+def test_near_locking_machine_code_is_what_walks_find():
     """Much friction: weighted norms show that there is one solution where the sum of a row does not."""
     compared(slider_crank(0.8))
 
 
-DRIVES: dict[str, dict[str, Any]] = {
+DRIVES = {
     "constant": {"kind": "constant", "effort": 5.0},
     "geared": {
         "kind": "linear", "stall_effort": 5, "no_load_speed": 90, "ratio": 3, "efficiency": 0.9, "inertia": 1e-3,
@@ -93,14 +90,14 @@ DRIVES: dict[str, dict[str, Any]] = {
 @pytest.mark.spread(5)
 @pytest.mark.parametrize("kind", DRIVES)
 @pytest.mark.parametrize("name", ["durango-fourbar", "whitworth-quick-return", "jansen"])
-def test_machine_code_of_examples_is_what_walks_find(name: str, kind: str) -> None:
+def test_machine_code_of_examples_is_what_walks_find(name, kind):
     """Dyads of several kinds, one behind the other, driven by every kind of motor."""
-    data = read(EXAMPLES / f"{name}.yaml").data()
+    data = example(name).data()
     next(iter(data["drivers"].values()))["motor"] = DRIVES[kind]
     compared(Mechanism(**data), lanes=3)
 
 
-def test_slow_motion_is_the_quasi_static_cycle() -> None:
+def test_slow_motion_is_the_quasi_static_cycle():
     """At a crawl, kept up by a huge flywheel, the reactions are those of `analyse` at a crawl."""
     data = slider_crank().data()
     crank = {**data["links"]["crank"], "inertia": 1e6}
@@ -115,7 +112,7 @@ def test_slow_motion_is_the_quasi_static_cycle() -> None:
         assert np.abs(found - wanted).max() < 1e-6 * np.abs(wanted).max()
 
 
-def test_it_stays_where_friction_holds_it() -> None:
+def test_it_stays_where_friction_holds_it():
     """A torque below the friction moves nothing; the reactions are those of one of the possible shares of friction."""
     motor = {"kind": "constant", "effort": 0.05}
     result = simulate(slider_crank(0.3, drivers={"O": {"speed": 1, "start": 0.8, "motor": motor}}, loads={}), 1.0, 4)
@@ -124,7 +121,7 @@ def test_it_stays_where_friction_holds_it() -> None:
     assert [one.code for one in result.trunnion.findings] == ["simulate.stays_at_rest"]
 
 
-def rocker(friction: float) -> Mechanism:
+def rocker(friction):
     """A crank-rocker driven at its rocker, which turns round at cos φ = −0.78125, coupler and crank in line."""
     return Mechanism(
         gravity=[0, 0],
@@ -143,7 +140,7 @@ def rocker(friction: float) -> Mechanism:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction", "close"), [(0.0, 1e-6), pytest.param(0.1, 1e-4, marks=pytest.mark.slow)])
-def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -> None:
+def test_a_driven_joint_ends_at_its_dead_centre(friction, close):
     """It is foreseen, told with its place and time, and reached in some hundred evaluations."""
     motion = FreeMotion.of(prepare(rocker(friction)))
     found = ActiveMotion(motion, Walks(motion), 2.0, 1e-9).run(initial_row(motion))
@@ -154,7 +151,7 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -
     assert found.asked < 1000
 
 
-NO_MOTION: list[dict[str, Any]] = [
+NO_MOTION = [
     {}, {"initial": {"speed": 1}}, {"range": [0, 1], "motor": LINEAR, "initial": {"coordinate": 2}},
     {"motor": {"kind": "table", "points": [[0, 1], [0, 2]]}}, {"motor": {"kind": "linear", "stall_effort": 1}},
     {"motor": {"kind": "steam"}},
@@ -164,13 +161,13 @@ NO_MOTION: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("driver", NO_MOTION)
-def test_a_driver_that_cannot_be_let_move_is_refused(driver: dict[str, Any]) -> None:
+def test_a_driver_that_cannot_be_let_move_is_refused(driver):
     with pytest.raises(MechanismError) as caught:
         simulate(Mechanism(**{**wheel(LINEAR).data(), "drivers": {"A": {"speed": 1, **driver}}}), 1.0)
     assert {one.code for one in caught.value.findings} == {"input.drivers"}
 
 
-def test_what_has_no_mass_has_no_acceleration() -> None:
+def test_what_has_no_mass_has_no_acceleration():
     data = wheel(LINEAR).data()
     data["links"]["wheel"]["inertia"] = 0
     with pytest.raises(MechanismError) as caught:
@@ -178,10 +175,10 @@ def test_what_has_no_mass_has_no_acceleration() -> None:
     assert caught.value.findings[0].where == "drivers.A"
 
 
-def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
+def test_the_speed_of_a_pendulum_is_largest_between_the_rows():
     """ω² = 2 g (1 − cos 0.5) at the bottom, a quarter of a period from the start."""
     bob = {"points": {"A": [0, 0]}, "mass": 1, "centre": [1, 0]}
-    data: dict[str, Any] = {
+    data = {
         "gravity": [0, -9.81],
         "links": {"ground": {"points": {"A": [0, 0]}}, "bob": bob},
         "joints": {"A": {"type": "revolute", "links": ["ground", "bob"]}},
@@ -196,12 +193,12 @@ def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
 
 
 @pytest.mark.parametrize("options", [{"duration": -1.0}, {"duration": 1.0, "steps": 0}, {"tolerance": 1.0}])
-def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
+def test_numbers_without_sense_are_refused(options):
     with pytest.raises(MechanismError):
         simulate(wheel(LINEAR), **options)
 
 
-def ended(result: Any, code: str) -> dict[str, Any]:
+def ended(result, code):
     """The figures of the one finding that tells the end, which is the last row."""
     (figures,) = [one.figures for one in result.trunnion.findings if one.code == f"simulate.{code}"]
     assert result["time"].values[-1] == pytest.approx(figures["time"], rel=1e-12)
@@ -211,7 +208,7 @@ def ended(result: Any, code: str) -> dict[str, Any]:
     return dict(figures)
 
 
-def test_the_figures_at_the_end_are_of_the_end() -> None:
+def test_the_figures_at_the_end_are_of_the_end():
     """A wheel under a constant torque: ω = √(2 T θ / J) at the end of its range."""
     data = wheel(LINEAR, drag=0.0).data()
     data["drivers"] = {"A": {"speed": 1, "range": [0, 2], "motor": {"kind": "constant", "effort": 4}}}
@@ -225,9 +222,7 @@ def test_the_figures_at_the_end_are_of_the_end() -> None:
 @pytest.mark.parametrize(
     ("space", "first", "compiled"), [("planar", True, True), ("planar", False, False), ("spatial", False, True)]
 )
-def test_a_range_ends_the_motion_of_several_drivers(
-    space: str, first: bool, compiled: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_range_ends_the_motion_of_several_drivers(space, first, compiled, monkeypatch):
     """θ = θ₀ + T t²/(2 J), of the one that gets there first, driven either way."""
     if not compiled:
         monkeypatch.setattr("trunnion.dynamics.simulate.rates_of", Walks)
@@ -242,7 +237,7 @@ def test_a_range_ends_the_motion_of_several_drivers(
     assert figures["time"] == pytest.approx(time if first else 1 / 3, rel=1e-8), flat
 
 
-def test_a_range_that_is_left_and_entered_within_a_step_ends_the_motion() -> None:
+def test_a_range_that_is_left_and_entered_within_a_step_ends_the_motion():
     """The swing of a spring goes beyond the range by a millionth of itself."""
     data = two_wheels({"kind": "constant", "effort": 0.0}).data()
     for joint in data["joints"].values():
@@ -254,7 +249,7 @@ def test_a_range_that_is_left_and_entered_within_a_step_ends_the_motion() -> Non
 
 
 # change points
-def folding(mechanism: Mechanism) -> Mechanism:
+def folding(mechanism):
     """The same, to fold over at its change points."""
     data = mechanism.data()
     data["assembly"]["rocker"] = "folds"
@@ -263,7 +258,7 @@ def folding(mechanism: Mechanism) -> Mechanism:
 
 @pytest.mark.parametrize("several", [False, True])
 @pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
-def test_a_motion_ends_at_a_change_point(space: str, several: bool) -> None:
+def test_a_motion_ends_at_a_change_point(space, several):
     """Where links that fold over would jump: θ = 1 + T t²/(2 J) up to all links in line."""
     mechanism = folding(driven_four_bar(space, *PARALLELOGRAM))
     assert "assembly.change_point" in {one.code for one in analyse(mechanism, 12).trunnion.findings}
@@ -278,27 +273,27 @@ def test_a_motion_ends_at_a_change_point(space: str, several: bool) -> None:
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize(("kind", "places"), [(ANTIPARALLELOGRAM, (np.pi, 0.0)), (DELTOID, (2 * np.pi, 0.0))])
-def test_other_linkages_end_at_theirs(kind: Any, places: tuple[float, float], sense: float) -> None:
+def test_other_linkages_end_at_theirs(kind, places, sense):
     moved = driven_four_bar("planar", *kind, motor={"kind": "constant", "effort": sense * 2.0})
     figures = ended(simulate(folding(moved), 3.0, 60), "change_point")
     assert figures["coordinate"] == pytest.approx(places[0 if sense > 0 else 1], abs=1e-7)
 
 
 @pytest.mark.parametrize("several", [False, True])
-def test_no_motion_begins_at_a_change_point(several: bool) -> None:
+def test_no_motion_begins_at_a_change_point(several):
     mechanism = driven_four_bar("planar", *PARALLELOGRAM, start=np.pi)
     with pytest.raises(MechanismError, match=r"drivers\.A\.initial: begins at a change point"):
         simulate(beside(mechanism) if several else mechanism, 1.0)
 
 
 # evaluations
-def test_a_motion_ends_where_its_evaluations_are_used_up() -> None:
+def test_a_motion_ends_where_its_evaluations_are_used_up():
     """The motion until then is there."""
     result = simulate(swinging("planar", stiffness=1e12), 1.0, 20, evaluations=2000)
     assert ended(result, "evaluations")["count"] == 2000
 
 
-def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it() -> None:
+def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it():
     motor = {"kind": "constant", "effort": 3.0}
     driver = {"free": True, "speed": 5, "range": [0.3, 1.0], "initial": {"coordinate": 1.0, "speed": 0}, "motor": motor}
     result = simulate(slider_crank(0.0, drivers={"O": driver}), 0.5, 10)
@@ -307,15 +302,15 @@ def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.06])
-def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
+def test_a_start_where_no_mass_moves_is_refused(friction):
     """A piston that is the only mass, at its dead centre; not with a rotor, nor beside the dead centre."""
-    data = read(EXAMPLES / "flywheel-press.yaml").data()
+    data = example("flywheel-press").data()
     for link in ("crank", "rod"):
         data["links"][link] = {"points": data["links"][link]["points"]}
     data["joint_defaults"], data["loads"] = {"friction": friction}, {}
     motor = {"kind": "constant", "effort": 50}
 
-    def begun(start: float, **more: float) -> None:
+    def begun(start, **more):
         simulate(Mechanism(**{**data, "drivers": {"O": {"speed": 10, "start": start, "motor": motor | more}}}), 1e-4, 1)
 
     with pytest.raises(MechanismError, match="nothing moves that has a mass"):
@@ -325,9 +320,9 @@ def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
 
 
 @pytest.mark.slow
-def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
+def test_a_driven_joint_in_space_ends_at_its_dead_centre():
     """The rocker of an RSSR moves by itself up to the end of its swing, which a cycle driven by the crank tells."""
-    data = read(EXAMPLES / "rssr.yaml").data()
+    data = example("rssr").data()
     swing = brief(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
     k = int(np.argmax(swing))
     low, top, high = swing[k - 1], swing[k], swing[(k + 1) % len(swing)]
@@ -341,7 +336,7 @@ def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
 
 
 @pytest.mark.slow
-def test_a_load_that_may_hold_a_joint_stands_beside_rigid_bodies_in_play() -> None:
+def test_a_load_that_may_hold_a_joint_stands_beside_rigid_bodies_in_play():
     """The slider rests until the pin strikes, and the load takes a force times the way."""
     loads = {"drag": {"joint": "S", "resisting_force": 1}}
     found = simulate(rattling({"law": "rigid", "restitution": 0.4}, loads=loads), 6e-4, 60)

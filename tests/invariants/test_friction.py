@@ -1,6 +1,5 @@
 """Every friction is what its law says for its load wherever the status says solved; following it from none to all."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,18 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from mechanisms import eccentric_press
 from trunnion import FrictionMethod
 from trunnion.algebra.dual import derivative, primal, seed
-from trunnion.joints.contact_loads import ContactLoad, GuideLoad, PinLoad, Reaction
+from trunnion.joints.contact_loads import GuideLoad, PinLoad
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.solve import continuation
-from trunnion.solve.friction import Contact, Settled, settle
+from trunnion.solve.friction import Contact, settle
 from trunnion.solve.run import prepare
 
-Array = NDArray[np.float64]
 NEWTON = FrictionMethod()
 COULOMB = FRICTION_LAWS["coulomb"]
 
@@ -30,14 +27,12 @@ class Linear:
 
     columns: Any
 
-    def reactions(self, loads: Sequence[Any]) -> list[Reaction]:
+    def reactions(self, loads):
         found = sum(load * column for load, column in zip(loads, self.columns, strict=True))
         return [tuple(joint) for joint in found]
 
 
-def settled(
-    start: Array, influence: Array, contacts: Sequence[tuple[ContactLoad, Any]], method: FrictionMethod
-) -> Settled:
+def settled(start, influence, contacts, method):
     """Of contacts (load, coefficient), one a joint. start: (joint, 3, lane); influence: (contact, joint, 3, lane)."""
     count = len(contacts)
     made = [
@@ -53,7 +48,7 @@ def settled(
         return settle(Linear([start, *influence]).reactions, [1.0] + [0.0] * count, made, method)
 
 
-def missed(found: Settled, contacts: Sequence[tuple[ContactLoad, Any]]) -> Array:
+def missed(found, contacts):
     """Largest |friction − law| of each lane over its largest friction, from what was found alone."""
     with np.errstate(all="ignore"):
         law = [
@@ -63,7 +58,7 @@ def missed(found: Settled, contacts: Sequence[tuple[ContactLoad, Any]]) -> Array
         return np.asarray(gaps / np.max(np.abs(found.forces), axis=0))
 
 
-def test_a_load_that_changes_ends_while_the_other_end_stays() -> None:
+def test_a_load_that_changes_ends_while_the_other_end_stays():
     """A guide pressed by F = 1 − φ/2 and by a couple of 0.97 that no friction changes: φ = f · 0.97, at once or not."""
     f = 0.49
     guide = GuideLoad((0.0, 1.0), 2.0)
@@ -75,7 +70,7 @@ def test_a_load_that_changes_ends_while_the_other_end_stays() -> None:
 
 
 @st.composite
-def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[ContactLoad, Any]]]:
+def modules(draw):
     """Up to four pins and guides, 40 lanes, friction weak to strong: some lanes have a certificate, others lock."""
     count = draw(st.integers(1, 4))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -96,7 +91,7 @@ def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[ContactLoad, Any]
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(modules())
-def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[ContactLoad, Any]]]) -> None:
+def test_converged_lanes_obey_their_laws(case):
     """Of both methods; where successive approximation converges and the solution is unique, both are the same."""
     start, influence, contacts = case
     newton = settled(start, influence, contacts, NEWTON)
@@ -112,7 +107,7 @@ def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[Co
     assert np.allclose(np.array(newton.forces)[:, both], np.array(named.forces)[:, both], rtol=1e-7, atol=0)
 
 
-def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
+def test_derivatives_are_those_of_the_side_of_the_kink():
     """A guide beside its kink, friction from its couple alone: no derivative by the force that another end carries."""
     for force, expected in ((0.5, 0.0), (2.0, 0.49 / (1 + 0.5 * 0.49))):
         push = seed(np.array([force]))
@@ -126,7 +121,7 @@ def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
         assert primal(found.forces[0]) == pytest.approx(0.49 * (1.0 if expected == 0 else 2.0 / (1 + 0.5 * 0.49)))
 
 
-def test_single_positions_of_an_eccentric_press() -> None:
+def test_single_positions_of_an_eccentric_press():
     """One at a time, as no other one then makes the iteration go on; the law by hand, on both sides of a kink."""
     run = prepare(eccentric_press())
     sides = set()
@@ -158,7 +153,7 @@ def _pins(x, share, start, gain, signs):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "lanes"), [(0, 400), (2, 2000)])
-def test_lanes_lock_at_the_share_to_which_small_steps_lead(seed: int, lanes: int, monkeypatch: Any) -> None:
+def test_lanes_lock_at_the_share_to_which_small_steps_lead(seed, lanes, monkeypatch):
     """Folds, solutions that run to infinity and kinks, at up to six times the friction."""
     rng, start = np.random.default_rng(seed), [np.zeros(lanes)] * 3
     # pins with strong friction: reactions without it, influences, senses, lane last

@@ -1,7 +1,5 @@
 """Groups by themselves: closed forms against the general group, which is held against finite differences and power."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,7 +17,7 @@ from trunnion.groups.tree import OUTER, GroupJoint
 class Case:
     """Random poses of a group, built forward so that they close: link frames first, then elements to fit them."""
 
-    def __init__(self, group: General, lanes: int, seed: int, spread: float = 1.0, offset: float = 0.0) -> None:
+    def __init__(self, group, lanes, seed, spread=1.0, offset=0.0):
         rng = np.random.default_rng(seed)
         self.group, self.lanes, self.rng = group, lanes, rng
         n = group.links
@@ -43,7 +41,7 @@ class Case:
             self.elements.append((self._on(joint.sides[0], one), self._on(joint.sides[1], two)))
         self.drive = [self.drive[sorted(group.driven).index(k)] for k in group.driven]
 
-    def _on(self, link: int, element: Frame) -> Frame:
+    def _on(self, link, element):
         """A global element in the coordinates of its link; global if it is outside."""
         if link == OUTER:
             return element
@@ -56,9 +54,9 @@ class Case:
             f.c * element.s - f.s * element.c,
         )
 
-    def guess(self) -> list[Array]:
+    def guess(self):
         """Free tree coordinates of the pose it was built from."""
-        found: list[Array] = []
+        found = []
         for k, _ in self.group.free:
             one, two = (
                 element if link == OUTER else compose(self.frames[link], element)
@@ -70,18 +68,18 @@ class Case:
                 found.append(one.c * (two.x - one.x) + one.s * (two.y - one.y))
         return found
 
-    def outer(self) -> list[Any]:
+    def outer(self):
         """Random twist, or derivative of one, of every outside link, a different one for each joint."""
         return [
             Twist(*self.rng.normal(size=(3, self.lanes))) if OUTER in joint.sides else None
             for joint in self.group.joints
         ]
 
-    def loads(self) -> list[Wrench]:
+    def loads(self):
         return [Wrench(*self.rng.normal(size=(3, self.lanes))) for _ in range(self.group.links)]
 
 
-def same(a: Any, b: Any, weight: Array, tolerance: float = 1e-10) -> None:
+def same(a, b, weight, tolerance=1e-10):
     """Equal lane by lane, as a share of the lane's scale times its condition."""
     for one, two in zip(a, b, strict=True):
         for x, y in zip(one, two, strict=True):
@@ -89,7 +87,7 @@ def same(a: Any, b: Any, weight: Array, tolerance: float = 1e-10) -> None:
             assert np.all(difference <= tolerance * weight), float(np.max(difference / weight))
 
 
-def joined(text: str, *driven: int) -> General:
+def joined(text, *driven):
     """A group by its joints: kind and both links, x the outside; driven: places of the driven joints."""
     kinds = {"R": "revolute", "P": "prismatic"}
     links = [(one, two) for _, one, two in text.split()]
@@ -98,7 +96,7 @@ def joined(text: str, *driven: int) -> General:
     return General(1 + max(link for pair in places for link in pair), joints, driven)
 
 
-TOPOLOGIES: dict[str, General] = {
+TOPOLOGIES = {
     **{letters: dyad(letters) for letters in ("RRR", "RRP", "PRR", "RPR", "PRP", "RPP", "PPR")},
     "turned sides": joined("R0x P10 R1x"), "triad": joined("R30 R31 R32 Rx0 Rx1 Rx2"),
     "triad with slides": joined("R03 P31 R23 Px0 R1x Rx2"), "closed contour": joined("R01 R12 R23 R30 Rx0 Rx2"),
@@ -109,7 +107,7 @@ TOPOLOGIES: dict[str, General] = {
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)
-def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
+def test_general_motion_is_the_derivative_of_its_position(name):
     """Outer links and drives move along t; frames differentiated by nested duals in t give the same motion."""
     group = TOPOLOGIES[name]
     case = Case(group, 300, 2)
@@ -120,7 +118,7 @@ def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
     seconds = [case.rng.normal(size=300) for _ in group.driven]
     zero = np.zeros(300)
 
-    def along(value: Array, rate: Array, second: Array) -> Dual:
+    def along(value, rate, second):
         """value + rate t + second t²/2 with t seeded twice."""
         return Dual(Dual(value, rate), Dual(rate, second))
 
@@ -162,7 +160,7 @@ def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
 
 @pytest.mark.parametrize("offset", [0.0, 100.0])
 @pytest.mark.parametrize("kind", GROUPS)
-def test_every_entry_equals_the_general_group(kind: str, offset: float) -> None:
+def test_every_entry_equals_the_general_group(kind, offset):
     """Whatever is in the table: same motion and reactions as the general group, far from the origin too."""
     lanes = 2000
     closed, general = GROUPS[kind], dyad(kind)
@@ -188,7 +186,7 @@ def test_every_entry_equals_the_general_group(kind: str, offset: float) -> None:
 
 
 @given(st.floats(0.2, 3), st.floats(0.2, 3), st.floats(-np.pi, np.pi), st.floats(0.1, 3.0), st.sampled_from([1, -1]))
-def test_meet(bc: float, cd: float, turn: float, bend: float, branch: int) -> None:
+def test_meet(bc, cd, turn, bend, branch):
     """The pin found lies on both circles and on the stated side, from a triangle built the other way round."""
     b = (0.3, -0.7)
     c = (b[0] + bc * np.cos(turn), b[1] + bc * np.sin(turn))
@@ -201,7 +199,7 @@ def test_meet(bc: float, cd: float, turn: float, bend: float, branch: int) -> No
 
 
 @pytest.mark.parametrize("inward", [False, True])
-def test_circles_that_miss_each_other_by_a_nanometre_do_not_meet(inward: bool) -> None:
+def test_circles_that_miss_each_other_by_a_nanometre_do_not_meet(inward):
     """Only what rounding leaves of a dead centre counts as one; beyond, however little, there is no position."""
     bc, cd = 1.0, 0.5
     centre = bc - cd if inward else bc + cd

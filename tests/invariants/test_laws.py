@@ -1,9 +1,7 @@
 """Laws by themselves: friction, loads of bearings, impacts, the active set, shares of friction."""
 
 import itertools
-from collections.abc import Mapping
 from math import exp, tanh
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from trunnion.algebra.space import ORIGIN
-from trunnion.dynamics.active_set import RowMode, RowModes, settled
+from trunnion.dynamics.active_set import settled
 from trunnion.dynamics.bordered import least_shares
 from trunnion.dynamics.impact_motion import OPEN, STICK, strike
 from trunnion.joints.contact_loads import BearingLoad, GuideLoad, PinLoad
@@ -31,20 +29,20 @@ FORCES = {
 }  # fmt: skip
 
 
-def force(law: str, slip: float, **more: float) -> float:
+def force(law, slip, **more):
     known = FRICTION_LAWS[law]
     numbers = {name: NUMBERS[name] for name, declared in known.parameters.items() if not declared.optional}
     return float(known.function(N, slip, **numbers, **more))
 
 
 @pytest.mark.parametrize("law", FRICTION_LAWS)
-def test_force_of_sliding(law: str) -> None:
+def test_force_of_sliding(law):
     assert force(law, V) == pytest.approx(FORCES[law], rel=1e-12)
     assert force(law, -V) == pytest.approx(-FORCES[law], rel=1e-12)
 
 
 @pytest.mark.parametrize("deflection", [0.0, 2e-6, -3e-6])
-def test_bristles_pull_by_their_deflection_its_rate_and_the_speed(deflection: float) -> None:
+def test_bristles_pull_by_their_deflection_its_rate_and_the_speed(deflection):
     """LuGre: −(κ z + σ ż + c v) N with ż = v − κ |v| z/g(v); Dahl: −κ z N."""
     rate = V - 2e4 * V * deflection / CURVE
     assert force("lugre", V, deflection=deflection) == pytest.approx(
@@ -53,7 +51,7 @@ def test_bristles_pull_by_their_deflection_its_rate_and_the_speed(deflection: fl
     assert force("dahl", V, deflection=deflection) == pytest.approx(-2e4 * deflection * N, rel=1e-12)
 
 
-def test_bristles_forget_over_the_way_that_bends_them() -> None:
+def test_bristles_forget_over_the_way_that_bends_them():
     """ż = v − d z: steady sliding bends them by v/d = g(v)/κ, Dahl's by f/κ."""
     for law, bent in (("lugre", CURVE / 2e4), ("dahl", 0.12 / 2e4)):
         known = FRICTION_LAWS[law]
@@ -62,7 +60,7 @@ def test_bristles_forget_over_the_way_that_bends_them() -> None:
         assert V / decay == pytest.approx(bent, rel=1e-12)
 
 
-def test_what_jumps_where_sliding_begins_is_larger_at_rest() -> None:
+def test_what_jumps_where_sliding_begins_is_larger_at_rest():
     """The value at rest has the sense of the slip about to begin, as that of sliding has."""
     for law in FRICTION_LAWS.values():
         if law.at_rest is not None:
@@ -75,13 +73,13 @@ def test_what_jumps_where_sliding_begins_is_larger_at_rest() -> None:
 LENGTH, WIDTH = 0.3, 0.05
 
 
-def of(load: Any, *reaction: float) -> float:
+def of(load, *reaction):
     """Normal load under a reaction about the middle of the bearing."""
     return float(load.normal(load.felt(reaction)))
 
 
 @pytest.mark.parametrize("summed", [False, True])
-def test_torsion_of_a_guide_is_carried_by_two_forces_its_width_apart(summed: bool) -> None:
+def test_torsion_of_a_guide_is_carried_by_two_forces_its_width_apart(summed):
     """M = F w with F on either side: 2 M/w, to which a force across adds itself; along it nothing presses."""
     guide = BearingLoad(ORIGIN, LENGTH, summed, width=WIDTH)
     assert of(guide, 0, 0, 0, 0, 0, 3.0) == pytest.approx(2 * 3.0 / WIDTH)
@@ -89,7 +87,7 @@ def test_torsion_of_a_guide_is_carried_by_two_forces_its_width_apart(summed: boo
     assert of(guide, 30.0, 40.0, 500.0, 0, 0, 3.0) == pytest.approx(50.0 + 2 * 3.0 / WIDTH)
 
 
-def test_a_moment_across_a_bearing_is_carried_by_its_ends() -> None:
+def test_a_moment_across_a_bearing_is_carried_by_its_ends():
     """M = F L with F on either end; a force off the middle by a loads the ends as a lever: F (1/2 ± a/L)."""
     bearing = BearingLoad(ORIGIN, LENGTH)
     assert of(bearing, 0, 0, 0, 3.0, 0, 0) == pytest.approx(2 * 3.0 / LENGTH)
@@ -100,7 +98,7 @@ def test_a_moment_across_a_bearing_is_carried_by_its_ends() -> None:
 
 
 @pytest.mark.parametrize("off", [0.0, 0.1, 0.4, 0.9])
-def test_a_guide_in_the_plane_is_loaded_at_its_two_ends(off: float) -> None:
+def test_a_guide_in_the_plane_is_loaded_at_its_two_ends(off):
     """A force off the middle by `off` presses on the ends, L/2 to either side, as on a beam on two supports."""
     guide = GuideLoad(across=(0.0, 1.0), length=LENGTH)
     ends = [70.0 * (0.5 + sign * off) for sign in (1, -1)]
@@ -120,7 +118,7 @@ LOADS = {
 
 
 @pytest.mark.parametrize("name", LOADS)
-def test_the_gradient_of_a_normal_load_is_that_of_differences(name: str) -> None:
+def test_the_gradient_of_a_normal_load_is_that_of_differences(name):
     load, random = LOADS[name], np.random.default_rng(3)
     size = 3 if isinstance(load, PinLoad | GuideLoad) else 6
     for _ in range(20):
@@ -136,9 +134,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 @example(1, 2, 0, 1.0, 1.0)  # no case fits this restitution
 @given(seeds, st.integers(1, 3), st.integers(0, 2), st.floats(0, 1), st.floats(0, 2))
-def test_an_impact_keeps_its_law_and_gains_nothing(
-    seed: int, places: int, more: int, restitution: float, friction: float
-) -> None:
+def test_an_impact_keeps_its_law_and_gains_nothing(seed, places, more, restitution, friction):
     """Random masses, ways and rates, with as many coordinates as places or more."""
     random = np.random.default_rng(seed)
     count = places + 1 + more
@@ -176,7 +172,7 @@ def test_an_impact_keeps_its_law_and_gains_nothing(
             assert abs(tangent[k] + case * friction * normal[k]) <= small
 
 
-def test_two_places_on_one_wall_share_an_impulse() -> None:
+def test_two_places_on_one_wall_share_an_impulse():
     """Their slips are one, so that the tangential equations are singular."""
     ways = np.array([[1.0, -0.5, 0.0], [1.0, 0.5, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
     spread = np.linalg.solve(np.diag([1.0, 0.1, 1.0]), ways.T)
@@ -187,20 +183,20 @@ def test_two_places_on_one_wall_share_an_impulse() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6))
-def test_the_worst_row_first_finds_what_all_cases_have(seed: int, count: int) -> None:
+def test_the_worst_row_first_finds_what_all_cases_have(seed, count):
     """w = M z + q, z ≥ 0, w ≥ 0, z·w = 0; of a positive definite M exactly one case agrees."""
     random = np.random.default_rng(seed)
     root, begin = random.normal(size=(count, count)), random.normal(size=count)
     matrix = root @ root.T + 0.1 * np.eye(count) + 0.5 * (root - root.T)
 
-    def missed(modes: RowModes) -> dict[int, float]:
+    def missed(modes):
         held = [k for k, mode in enumerate(modes) if mode == 0]
         force = np.zeros(count)
         force[held] = np.linalg.solve(matrix[np.ix_(held, held)], -begin[held])
         gap = matrix @ force + begin
         return {k: min(0.0, force[k] if k in held else gap[k]) for k in range(count)}
 
-    def objections(modes: RowModes) -> Mapping[int, RowMode]:
+    def objections(modes):
         rows = missed(modes)
         worst = min(rows, key=lambda k: rows[k])
         return {worst: None if modes[worst] == 0 else 0} if rows[worst] < -1e-12 else {}
@@ -209,8 +205,8 @@ def test_the_worst_row_first_finds_what_all_cases_have(seed: int, count: int) ->
     assert [settled([None] * count, objections, [(None, 0)] * count)] == solutions
 
 
-def test_where_changes_come_round_all_cases_are_tried() -> None:
-    def objections(modes: RowModes) -> Mapping[int, RowMode]:
+def test_where_changes_come_round_all_cases_are_tried():
+    def objections(modes):
         return {} if modes == (0, None) else {k: None if mode == 0 else 0 for k, mode in enumerate(modes)}
 
     assert settled([None, None], objections, [(None, 0)] * 2) == (0, None)
@@ -218,7 +214,7 @@ def test_where_changes_come_round_all_cases_are_tried() -> None:
 
 
 @pytest.mark.parametrize(("rank", "count"), [(1, 1), (1, 4), (2, 2), (2, 5), (3, 6)])
-def test_the_largest_share_is_the_least(rank: int, count: int) -> None:
+def test_the_largest_share_is_the_least(rank, count):
     random = np.random.default_rng(rank * 10 + count)
     for _ in range(10):
         ways, wanted = random.normal(size=(rank, count)), random.normal(size=rank)

@@ -1,14 +1,13 @@
 """Loads that vary and follow, tables, springs and dampers: closed forms, energy, virtual work, and refusals."""
 
 import copy
-from typing import Any
 
 import numpy as np
 import pytest
 
 import trunnion
 from brief import brief
-from mechanisms import Array, Data, findings, four_bar, slide, slider_crank
+from mechanisms import findings, four_bar, slide, slider_crank
 from mechanisms_parts import bare, joined
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
@@ -20,21 +19,21 @@ TURN = 2 * np.pi
 FULL_TURN = np.arange(STEPS) * (TURN / STEPS)
 
 
-def run(data: Data, steps: int = STEPS) -> Any:
+def run(data, steps=STEPS):
     """The variables of every position, without what is asked of the cycle."""
     return brief(Mechanism(**data), steps)
 
 
-def analysed(data: Data, steps: int = STEPS) -> Any:
+def analysed(data, steps=STEPS):
     """With findings and figures of the cycle."""
     return trunnion.analyse(Mechanism(**data), steps)
 
 
-def effort(result: Any) -> Array:
+def effort(result):
     return np.asarray(result["drive_effort"].values[0])
 
 
-def balanced(result: Any) -> None:
+def balanced(result):
     """The powers cancel to rounding, and there are some."""
     powers = [np.abs(result[name].values).max() for name in ("drive_power", "useful_power", "spring_power")
               if name in result]  # fmt: skip
@@ -42,7 +41,7 @@ def balanced(result: Any) -> None:
     assert np.abs(result["power_residual"].values).max() < 1e-12 * max(powers)
 
 
-def refused(**data: Any) -> str:
+def refused(**data):
     with pytest.raises(MechanismError) as caught:
         Mechanism(**data)
     return str(caught.value)
@@ -51,7 +50,7 @@ def refused(**data: Any) -> str:
 # expressions of the motion
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [None, 0.1])
-def test_expression_equals_the_constant_force_of_each_position(friction: float | None) -> None:
+def test_expression_equals_the_constant_force_of_each_position(friction):
     data = slider_crank()
     data |= {"gravity": [0, -9.81], "dimensions": {"F": 600}}
     data["joint_defaults"] = {"pin": {"radius": 0.02}, "guide": {"length": 0.4}, "friction": friction or 0}
@@ -78,7 +77,7 @@ def test_expression_equals_the_constant_force_of_each_position(friction: float |
             np.testing.assert_allclose(result[name].values[..., k], same[name].values[..., k], rtol=1e-12, atol=1e-9)
 
 
-def test_expressions_of_loads_take_samples_and_duals() -> None:
+def test_expressions_of_loads_take_samples_and_duals():
     data = bare(slider_crank()) | {"dimensions": {"F": "600 N ± 20 N"}}
     data["loads"] = {"gas": {"link": "piston", "at": "P", "force": ["-F * (1 + cos(drive))", 0]}}
     mechanism = Mechanism(**data)
@@ -98,7 +97,7 @@ def test_expressions_of_loads_take_samples_and_duals() -> None:
 
 
 # following forces, one-way resistance
-def test_following_force_equals_the_force_turned_by_hand() -> None:
+def test_following_force_equals_the_force_turned_by_hand():
     data = four_bar()
     data["loads"] = {"push": {"link": "coupler", "at": "E", "force": [12.0, -30.0], "frame": "link"}}
     result = run(data)
@@ -111,7 +110,7 @@ def test_following_force_equals_the_force_turned_by_hand() -> None:
 
 
 @pytest.mark.parametrize("only", ["positive", "negative"])
-def test_resistance_of_one_direction(only: str) -> None:
+def test_resistance_of_one_direction(only):
     data = bare(slider_crank())
     data["loads"] = {"cut": {"joint": "C", "resisting_force": 100.0, "only": only}}
     result = run(data, 49)
@@ -121,7 +120,7 @@ def test_resistance_of_one_direction(only: str) -> None:
     np.testing.assert_allclose(result["useful_power"].values, np.where(acts, 100 * np.abs(speed), 0), atol=1e-9)
 
 
-def test_resistance_that_varies_and_one_that_drives() -> None:
+def test_resistance_that_varies_and_one_that_drives():
     data = bare(slider_crank())
     data["loads"] = {"cut": {"joint": "C", "resisting_force": "100 N * (1 + cos(drive))"}}
     result = run(data)
@@ -143,7 +142,7 @@ VALUES = [3.0, -1.0, 2.0, 7.0, 1.0, 3.0]
 
 @pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("periodic", [False, True])
-def test_table_at_and_between_its_knots(smooth: bool, periodic: bool) -> None:
+def test_table_at_and_between_its_knots(smooth, periodic):
     np.testing.assert_allclose(look_up(KNOTS, VALUES, np.array(KNOTS), smooth, periodic), VALUES, atol=1e-12)
     place = np.linspace(0.05, TURN - 0.1, 37)
     found = look_up(KNOTS, VALUES, place, smooth, periodic)
@@ -164,13 +163,13 @@ def test_table_at_and_between_its_knots(smooth: bool, periodic: bool) -> None:
     np.testing.assert_allclose(by_place, (ends[1] - ends[0]) / (2 * h), atol=1e-6)
 
 
-def table_of(interpolation: str = "linear", periodic: bool = True) -> Data:
+def table_of(interpolation="linear", periodic=True):
     points = [[f"{np.degrees(a)} deg", f"{v} bar"] for a, v in zip(KNOTS, VALUES, strict=True)]
     return {"over": "drive", "points": points, "interpolation": interpolation, "periodic": periodic}
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "spline"])
-def test_load_by_a_table(interpolation: str) -> None:
+def test_load_by_a_table(interpolation):
     """An indicator diagram: pressure over the crank angle, times the area of the piston."""
     data = bare(slider_crank()) | {"tables": {"p": table_of(interpolation)}, "dimensions": {"area": "20 cm^2"}}
     data["drivers"] = {"A": {"speed": 5.0, "start": 2.0}}  # the drive runs beyond a turn
@@ -187,7 +186,7 @@ def test_load_by_a_table(interpolation: str) -> None:
     assert mechanism.parameter_kinds()["tables.p.points.1.at"].name == "angle"
 
 
-def test_outside_its_table_a_load_has_no_value() -> None:
+def test_outside_its_table_a_load_has_no_value():
     data = bare(slider_crank()) | {"tables": {"f": {"over": "time", "points": [[0, "1 N"], ["0.5 s", "3 N"]]}}}
     data["loads"] = {"push": {"link": "piston", "at": "P", "force": ["f", 0]}}
     result = analysed(data)
@@ -201,21 +200,21 @@ def test_outside_its_table_a_load_has_no_value() -> None:
 
 
 # springs
-def spring_four_bar(**spring: Any) -> Data:
+def spring_four_bar(**spring):
     data = bare(four_bar())
     data["links"]["ground"]["points"]["S"] = [0.2, 1.1]
     data["springs"] = {"S": {"between": ["ground.S", "coupler.E"], **spring}}
     return data
 
 
-def test_effort_of_a_spring_is_the_slope_of_its_energy() -> None:
+def test_effort_of_a_spring_is_the_slope_of_its_energy():
     """Massless, no friction: the drive torque is dV/dθ, V = F₀ e + k e²/2 with e = L − L₀."""
     k, free, preload = 900.0, 0.3, 20.0
     data = spring_four_bar(stiffness=k, free_length=free, preload=preload)
     result = run(data)
     balanced(result)
 
-    def energy(shift: float) -> Array:
+    def energy(shift):
         moved = copy.deepcopy(data)
         moved["drivers"]["A"]["start"] = shift
         e = run(moved)["spring_elongation"].values[0]
@@ -236,7 +235,7 @@ def test_effort_of_a_spring_is_the_slope_of_its_energy() -> None:
     assert np.all(result["useful_power"].values == 0)
 
 
-def test_damper_takes_what_the_drive_gives() -> None:
+def test_damper_takes_what_the_drive_gives():
     result = run(spring_four_bar(damping=35.0), 400)
     balanced(result)
     lost = result["damping_power"].values[0]
@@ -252,7 +251,7 @@ def test_damper_takes_what_the_drive_gives() -> None:
     np.testing.assert_allclose(35.0 * np.mean(rate**2), lost.mean(), rtol=1e-9)
 
 
-def test_torsional_spring_in_another_joint() -> None:
+def test_torsional_spring_in_another_joint():
     """Virtual work: effort · ω_A = k φ · ω_C, φ the rotation of C from the free angle; no net work over a turn."""
     data = bare(four_bar())
     data["springs"] = {"S": {"joint": "C", "stiffness": 3.0, "free_angle": 1.0, "preload": "2 N m"}}
@@ -270,7 +269,7 @@ def test_torsional_spring_in_another_joint() -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_duals_of_spring_numbers_equal_central_differences(friction: float) -> None:
+def test_duals_of_spring_numbers_equal_central_differences(friction):
     data = spring_four_bar(stiffness=900.0, free_length=0.3, damping=20.0, preload=5.0)
     data["springs"]["T"] = {"joint": "C", "stiffness": 3.0, "free_angle": 1.0, "damping": 0.2}
     data["joint_defaults"] = {"pin": {"radius": 0.02}, "friction": friction}
@@ -282,7 +281,7 @@ def test_duals_of_spring_numbers_equal_central_differences(friction: float) -> N
         value = mechanism.parameters()[mechanism.parameter_set.resolve(path)]
         step = 1e-4 * max(abs(value), 0.1)
 
-        def solved(number: Any, path: str = path) -> Any:
+        def solved(number, path=path):
             return prepared.solve(time, mechanism.parameters({path: number}), method).efforts["A"]
 
         differences = (solved(value + step) - solved(value - step)) / (2 * step)
@@ -290,7 +289,7 @@ def test_duals_of_spring_numbers_equal_central_differences(friction: float) -> N
         np.testing.assert_allclose(derivative(solved(Dual(value, 1.0))), differences, atol=2e-7 * scale, err_msg=path)
 
 
-def test_where_the_ends_of_a_spring_meet_it_has_no_value() -> None:
+def test_where_the_ends_of_a_spring_meet_it_has_no_value():
     data = bare(four_bar())
     data["links"]["ground"]["points"]["S"] = [0.3, 0.0]
     data["springs"] = {"S": {"between": ["ground.S", "crank.B"], "stiffness": 10.0, "free_length": 0.1}}
@@ -306,7 +305,7 @@ STIFF = {"stiffness": 5.0, "free_length": 0.1}
 STILL = {"drivers": {}, "loads": {"push": {"link": "coupler", "at": "E", "force": ["1 N * drive/1 rad", 0]}}}
 TWO = {"points": [[0, "1 N"], [1, "2 N"]]}
 ROUND = {"points": [[0, "1 N"], [1, "2 N"], [2, "3 N"]], "periodic": True}
-REFUSED: list[tuple[str, Any, str]] = [
+REFUSED = [
     # a spring between the ground and the coupler, and in the joint C
     ("spring", {**STIFF, "stiffness": -5.0}, "springs.S.stiffness: is -5 N/m, which is negative"),
     ("spring", {**STIFF, "stiffness": "5 N m"}, "is a moment where a stiffness is needed"),
@@ -356,14 +355,14 @@ REFUSED: list[tuple[str, Any, str]] = [
 ]
 
 
-def test_what_is_so_anyway_may_be_stated() -> None:
+def test_what_is_so_anyway_may_be_stated():
     load = {"joint": "D", "resisting_torque": 1.0}
     stated, plain = (Mechanism(**(four_bar() | {"loads": {"load": load | more}})) for more in ({"frame": "global"}, {}))
     assert stated.parameters() == plain.parameters()
 
 
 @pytest.mark.parametrize(("kind", "stated", "words"), REFUSED)
-def test_what_makes_no_sense_is_refused(kind: str, stated: Any, words: str) -> None:
+def test_what_makes_no_sense_is_refused(kind, stated, words):
     if kind == "spring":
         data = spring_four_bar(**stated)
     elif kind == "torsion":
@@ -383,7 +382,7 @@ FREE = 0.62  # m: within the lengths that the spring goes through
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("preload", [0.0, 15.0])
 @pytest.mark.parametrize("damping", [0.0, 20.0])
-def test_a_rope_and_a_bumper_are_halves_of_the_spring(damping: float, preload: float) -> None:
+def test_a_rope_and_a_bumper_are_halves_of_the_spring(damping, preload):
     """Where one acts it is the spring of both ways, where it does not there is nothing; so with the drive torque."""
     stated = {"stiffness": 900.0, "free_length": FREE, "damping": damping}
     for only, sign in (("pull", 1.0), ("push", -1.0)):
@@ -397,7 +396,7 @@ def test_a_rope_and_a_bumper_are_halves_of_the_spring(damping: float, preload: f
         assert np.abs(half["power_residual"].values).max() < 1e-12 * np.abs(half["drive_power"].values).max()
 
 
-def cart(**more: Any) -> Data:
+def cart(**more):
     """A cart that is driven along the ground, from 0 to 0.25 m."""
     return {
         "links": {"ground": {"points": {"X": slide(0, 0)}}, "cart": {"points": {"X": slide(0, 0)}}},
@@ -407,7 +406,7 @@ def cart(**more: Any) -> Data:
     }
 
 
-def test_a_spring_without_free_length_needs_no_direction() -> None:
+def test_a_spring_without_free_length_needs_no_direction():
     """Its ends meet at 0°: it pulls by k times the way between them, and turns the crank by k r² sin θ everywhere."""
     data = spring_four_bar()
     data["springs"]["S"] = {"between": ["ground.S", "crank.B"], "stiffness": 10.0, "free_length": 0}
@@ -417,7 +416,7 @@ def test_a_spring_without_free_length_needs_no_direction() -> None:
     assert result["drive_effort"].values[0] == pytest.approx(10.0 * (x * x + y * y) * np.sin(turn), abs=1e-12)
 
 
-def test_torsional_spring_in_the_driven_joint() -> None:
+def test_torsional_spring_in_the_driven_joint():
     """Closed form: the drive turns against k (θ − θ₀) + c ω, whole turns counted."""
     data = bare(four_bar())
     data["springs"] = {
@@ -431,14 +430,14 @@ def test_torsional_spring_in_the_driven_joint() -> None:
     balanced(result)
 
 
-def test_a_slide_has_springs_bumpers_and_loads_by_its_way() -> None:
+def test_a_slide_has_springs_bumpers_and_loads_by_its_way():
     """2 N/mm beyond −10 mm with 50 N s/m at 0.1 m/s; a bumper over the first 50 mm; 2 N/mm by the drive itself."""
     way = np.linspace(0.0, 0.25, 6)
-    springs: Data = {"S": {"joint": "X", "stiffness": "2 N/mm", "free_length": "-10 mm", "damping": "50 N s/m"}}
+    springs = {"S": {"joint": "X", "stiffness": "2 N/mm", "free_length": "-10 mm", "damping": "50 N s/m"}}
     np.testing.assert_allclose(effort(run(cart(springs=springs), 6)), 2000 * (way + 0.01) + 50 * 0.1, rtol=1e-12)
     springs = {"S": {"joint": "X", "stiffness": 2000.0, "free_length": 0.05, "only": "push"}}
     np.testing.assert_allclose(effort(run(cart(springs=springs), 6)), np.minimum(2000 * (way - 0.05), 0), atol=1e-12)
-    loads: Data = {"back": {"link": "cart", "at": "X", "force": ["-2 N/mm * drive", 0]}}
+    loads = {"back": {"link": "cart", "at": "X", "force": ["-2 N/mm * drive", 0]}}
     np.testing.assert_allclose(effort(run(cart(loads=loads), 6)), 2000 * way, rtol=1e-12, atol=1e-12)
     loads["back"]["force"] = ["-2 N * cos(drive)", 0]
     assert "cos is given a length" in refused(**cart(loads=loads))

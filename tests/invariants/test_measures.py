@@ -1,7 +1,5 @@
 """What holds of the figures of measures whatever the mechanism, and of extremes on panels."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -20,7 +18,7 @@ from trunnion.solve.run import prepare
 
 @given(st.floats(0.05, 6.2), st.floats(0.05, 3.0))
 @settings(max_examples=20)
-def test_windows_are_part_of_the_cycle(first: float, wide: float) -> None:
+def test_windows_are_part_of_the_cycle(first, wide):
     """A window has its ends to rounding, positions in rising order, and the same course as the whole cycle there."""
     run = RUN
     over = Measure("over", "rotation", "D", over=(first, first + wide), statistic="rms")
@@ -39,7 +37,7 @@ def test_windows_are_part_of_the_cycle(first: float, wide: float) -> None:
 RUN = prepare(build(four_bar()))
 
 
-def test_no_figure_of_a_mechanism_that_does_not_go_together_somewhere() -> None:
+def test_no_figure_of_a_mechanism_that_does_not_go_together_somewhere():
     """Of rods from too short to too long, held against many positions: however short the gap, no figure hides it."""
     measures = [
         Measure("least", "rotation", "D", statistic="minimum"),
@@ -63,7 +61,7 @@ TURN = 2 * np.pi
 EDGES = np.linspace(0.0, TURN, 9)
 
 
-def series(seed: int, orders: int = 4) -> Any:
+def series(seed, orders=4):
     """A periodic function with a few harmonics."""
     rng = np.random.default_rng(seed)
     a, phase = rng.normal(size=orders) / np.arange(1, orders + 1) ** 2, rng.uniform(0, TURN, orders)
@@ -71,23 +69,23 @@ def series(seed: int, orders: int = 4) -> Any:
     return lambda x: np.sum(a * np.cos(k * np.asarray(x)[..., None] + phase), axis=-1)
 
 
-def fitted(*functions: Any, edges: Any = EDGES) -> Any:
+def fitted(*functions, edges=EDGES):
     """Coefficients of courses on the same panels, (lane, panel, coefficient)."""
     time = edges[:-1, None] + np.diff(edges)[:, None] / 2 * (1 + POINTS)
     return np.array([function(time) for function in functions]) @ FIT.T
 
 
-def place_of(found: Any, lane: int = 0, edges: Any = EDGES) -> float:
+def place_of(found, lane=0, edges=EDGES):
     panel = found.panel[lane]
     return float(edges[panel] + (edges[panel + 1] - edges[panel]) / 2 * (np.ravel(found.spot)[lane] + 1))
 
 
-def first(rows: Any) -> Any:
+def first(rows):
     return rows[0]
 
 
 @given(st.integers(0, 10_000), st.sampled_from([1.0, -1.0]))
-def test_extremes_of_many_courses(seed: int, sign: float) -> None:
+def test_extremes_of_many_courses(seed, sign):
     """No lower than any of many places, level there, and those of `Courses` of each by itself."""
     functions = [series(seed + k) for k in range(3)]
     found, x = extreme(fitted(*functions)[None], first, sign), np.linspace(0, TURN, 20_001)
@@ -95,11 +93,11 @@ def test_extremes_of_many_courses(seed: int, sign: float) -> None:
         assert sign * found.value[lane] >= np.max(sign * function(x)) - 1e-9
         assert function(place_of(found, lane)) == pytest.approx(found.value[lane], abs=1e-8)
         alone = Courses.of(lambda t, f=function: (f(t)[None], np.zeros(len(t), int)), EDGES[[0, -1]])
-        assert alone.extreme(first, sign).value == pytest.approx(found.value[lane], abs=1e-7)  # type: ignore[union-attr]
+        assert alone.extreme(first, sign).value == pytest.approx(found.value[lane], abs=1e-7)
 
 
 @given(st.integers(0, 10_000), st.floats(-0.6, 0.6))
-def test_shares_above_a_level(seed: int, level: float) -> None:
+def test_shares_above_a_level(seed, level):
     function = series(seed)
     x = (np.arange(40_000) + 0.5) / 40_000 * TURN
     share = np.sum(above(fitted(function), level)) / 2 / (len(EDGES) - 1)
@@ -107,7 +105,7 @@ def test_shares_above_a_level(seed: int, level: float) -> None:
 
 
 @given(st.integers(0, 10_000))
-def test_derivatives(seed: int) -> None:
+def test_derivatives(seed):
     """Of an extreme, its place, a mean square and a share, against differences."""
     function, change = series(seed), series(seed + 1)
     own, other, step = fitted(function), fitted(change), 1e-6
@@ -121,7 +119,7 @@ def test_derivatives(seed: int) -> None:
         np.testing.assert_allclose(found.spot.dual, moved, rtol=1e-4, atol=1e-5)
     half = np.full((1, len(EDGES) - 1, 1), TURN / 16)
 
-    def square(coefficients: Any) -> Any:
+    def square(coefficients):
         values = (
             Dual(coefficients.real @ ON_GAUSS, coefficients.dual @ ON_GAUSS)
             if isinstance(coefficients, Dual)
@@ -140,7 +138,7 @@ def test_derivatives(seed: int) -> None:
         assert np.sum(above(dual, 0.1).dual) == pytest.approx((shares[0] - shares[1]) / (2 * step), rel=1e-3, abs=1e-4)
 
 
-def test_an_extreme_at_an_edge_moves_with_it() -> None:
+def test_an_extreme_at_an_edge_moves_with_it():
     """A course 1 + (t − p) up to a jump at p: its largest value changes as the edge does, its place by 1."""
     edges = np.array([0.0, 1.0, 2.0])
     time = edges[:-1, None] + np.diff(edges)[:, None] / 2 * (1 + POINTS)
@@ -153,7 +151,7 @@ def test_an_extreme_at_an_edge_moves_with_it() -> None:
     assert place_of(extreme((values @ FIT.T)[None, None], first), 0, edges) == pytest.approx(1.0)
 
 
-def test_gaps_and_constants() -> None:
+def test_gaps_and_constants():
     """A panel without values is left out, a course without any has no extreme, one that does not change no place."""
     own = fitted(np.cos, lambda x: 0 * x + 3.0, np.cos)
     own[0, 0] = own[0, -1] = np.nan
@@ -165,7 +163,7 @@ def test_gaps_and_constants() -> None:
 
 
 @given(st.integers(0, 10_000))
-def test_rows_at_times_of_panels_of_their_own(seed: int) -> None:
+def test_rows_at_times_of_panels_of_their_own(seed):
     rng = np.random.default_rng(seed)
     edges = np.sort(np.append(rng.uniform(0, TURN, (2, 3)), [EDGES] * 2, axis=1), axis=1)
     function, low, half = series(seed), edges[:, :-1], np.diff(edges) / 2

@@ -1,24 +1,23 @@
 """Motion laws of drivers: published factors, exact derivatives, and what the analysis makes of them."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
 from brief import brief
-from mechanisms import Data, analyse, build, class_three, five_bar, model, slider_crank
+from mechanisms import analyse, build, class_three, five_bar, model, slider_crank
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.spline import spline
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import MechanismError, Status
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.solve.run import prepare
 
 PROFILES = {name: law for name, law in MOTION_LAWS.items() if law.profile}
 TABLE = [[0.0, 0.1], [0.1, 0.5], [0.25, 0.9], [0.4, 0.3], [0.6, 0.1]]
-DRIVERS: dict[str, Data] = {
+DRIVERS = {
     "constant": {"speed": -6.0},
     "range": {"speed": 2.0, "range": [0.2, 1.4]},
     "harmonic": {"law": "harmonic", "mean": 0.3, "amplitude": 0.7, "period": 0.5, "phase": "90 deg"},
@@ -37,7 +36,7 @@ DRIVERS: dict[str, Data] = {
 }  # fmt: skip
 
 
-def driven(driver: Data, data: Data | None = None, name: str = "A", **options: Any) -> Mechanism:
+def driven(driver, data=None, name="A", **options):
     """A slider-crank, or another mechanism, with one driver replaced."""
     data = data or slider_crank()
     data["drivers"] = {**data["drivers"], name: driver}
@@ -49,7 +48,7 @@ def driven(driver: Data, data: Data | None = None, name: str = "A", **options: A
     ("name", "peak_rate", "peak_second"),
     [("cycloidal", 2.0, 6.2832), ("polynomial-345", 1.875, 5.7735), ("modified-sine", 1.7596, 5.5280)],
 )
-def test_peaks_are_the_published_factors(name: str, peak_rate: float, peak_second: float) -> None:
+def test_peaks_are_the_published_factors(name, peak_rate, peak_second):
     law = PROFILES[name]
     assert law.profile is not None
     _, rate, second = law.profile(np.linspace(0, 1, 100_001))
@@ -60,7 +59,7 @@ def test_peaks_are_the_published_factors(name: str, peak_rate: float, peak_secon
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_a_profile_takes_nested_duals_and_is_smooth(name: str) -> None:
+def test_a_profile_takes_nested_duals_and_is_smooth(name):
     profile = PROFILES[name].profile
     assert profile is not None
     u = np.linspace(0.001, 0.999, 333)
@@ -75,7 +74,7 @@ def test_a_profile_takes_nested_duals_and_is_smooth(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", DRIVERS)
-def test_derivatives_by_time_are_exact(name: str) -> None:
+def test_derivatives_by_time_are_exact(name):
     """Closed-form rate and second derivative against nested duals of the coordinate."""
     run = prepare(driven(DRIVERS[name]))
     time = np.linspace(0.003, 1.7 * run.cycle.duration, 211)
@@ -89,7 +88,7 @@ def test_derivatives_by_time_are_exact(name: str) -> None:
 
 @pytest.mark.parametrize("ends", ["clamped", "natural", "periodic"])
 @pytest.mark.parametrize("count", [2, 3, 4, 30])
-def test_splines_are_those_of_scipy(ends: Any, count: int) -> None:
+def test_splines_are_those_of_scipy(ends, count):
     if ends == "periodic" and count == 2:
         return
     rng = np.random.default_rng(count)
@@ -104,7 +103,7 @@ def test_splines_are_those_of_scipy(ends: Any, count: int) -> None:
         np.testing.assert_allclose(other[0], one, rtol=1e-9, atol=1e-11)
 
 
-def test_rise_dwell_return_dwell() -> None:
+def test_rise_dwell_return_dwell():
     run = prepare(driven({"law": "polynomial-345", "range": [0.5, 1.5], "duration": 0.2, "dwell": 0.1}))
     assert run.cycle.duration == pytest.approx(0.6)
     assert run.cycle.periodic
@@ -116,7 +115,7 @@ def test_rise_dwell_return_dwell() -> None:
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_a_return_of_its_own_duration(name: str) -> None:
+def test_a_return_of_its_own_duration(name):
     """Rise, dwell, return, dwell one after the other; the largest rate is that of the quicker of the two."""
     stated = {"law": name, "range": [0.5, 1.5], "duration": 0.4, "return_duration": 0.1, "dwell": 0.05}
     run = prepare(driven(stated))
@@ -144,13 +143,13 @@ NUMBERS = [
 
 
 @pytest.mark.parametrize(("law", "key"), NUMBERS)
-def test_every_number_has_a_path_samples_and_a_derivative(law: str, key: str) -> None:
+def test_every_number_has_a_path_samples_and_a_derivative(law, key):
     mechanism = driven(DRIVERS[law])
     run = prepare(mechanism)
     path, time, h = f"drivers.A.{key}", run.cycle.times(31) + 0.0037, 1e-6
     nominal = float(run.values[path])
 
-    def drive(value: Any) -> Any:
+    def drive(value):
         return run.system.drive(mechanism.parameters({path: value}), "A", time)
 
     samples = drive(np.array([[nominal - h], [nominal], [nominal + h]]))
@@ -164,7 +163,7 @@ def test_every_number_has_a_path_samples_and_a_derivative(law: str, key: str) ->
 # the analysis
 @pytest.mark.spread(5)
 @pytest.mark.parametrize("name", DRIVERS)
-def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
+def test_power_balances_and_the_motion_is_the_prescribed_one(name):
     mechanism = driven(DRIVERS[name])
     result = brief(mechanism, 72)
     assert set(np.unique(result.status)) <= {Status.SOLVED, Status.ZERO_SLIP}
@@ -179,7 +178,7 @@ def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     np.testing.assert_allclose(result.drive_power[0], result.drive_effort[0] * rate, rtol=1e-12, atol=1e-12)
 
 
-def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
+def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval():
     result = analyse({**slider_crank(), "drivers": {"A": DRIVERS["cycloidal"]}}, 60)
     resting = result.joint_rotation_velocity.sel(joint="A").values == 0
     assert 15 <= np.count_nonzero(resting) <= 25
@@ -193,7 +192,7 @@ def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
     assert any(row["where"] == "joints.A, B, P, C" for row in told)  # once for all
 
 
-def test_periods_and_ranges_that_do_not_fit() -> None:
+def test_periods_and_ranges_that_do_not_fit():
     data = five_bar()
     data["drivers"] = {"A": {"speed": 2 * np.pi}, "E": DRIVERS["harmonic"]}
     assert prepare(build(data)).cycle.duration == pytest.approx(1.0)
@@ -207,7 +206,7 @@ def test_periods_and_ranges_that_do_not_fit() -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["harmonic", "modified-sine", "periodic table", "late rise", "clamped table"])
-def test_a_general_group_follows_any_law(name: str) -> None:
+def test_a_general_group_follows_any_law(name):
     """Its track, read by time, and a slower run of the same motion."""
     mechanism = driven(DRIVERS[name], class_three())
     run = prepare(mechanism)
@@ -228,7 +227,7 @@ TIMES = {f"drivers.A.{key}" for key in ("period", "duration", "return_duration",
 
 # bad input
 RISE = {"law": "cycloidal", "range": [0.2, 1.0], "duration": 0.2}
-BAD: list[tuple[Data, str, str]] = [
+BAD = [
     ({"law": "cycloidal", "range": [0.2, 1.0]}, "drivers.A", "'duration' is missing"),
     ({"law": "harmonic", "amplitude": 0.1, "period": -0.5}, "drivers.A.period", "is -0.5 s, which is not above 0"),
     ({"law": "harmonic", "amplitude": 0, "period": 0.5}, "drivers.A.amplitude", "never moves"),
@@ -247,14 +246,14 @@ BAD: list[tuple[Data, str, str]] = [
 
 
 @pytest.mark.parametrize(("driver", "where", "what"), BAD)
-def test_bad_input_is_told(driver: Data, where: str, what: str) -> None:
+def test_bad_input_is_told(driver, where, what):
     with pytest.raises(MechanismError) as raised:
         Mechanism(**model({**slider_crank(), "drivers": {"A": driver}}))
-    found: list[Finding] = [one for one in raised.value.findings if one.where == where and what in one.what]
+    found = [one for one in raised.value.findings if one.where == where and what in one.what]
     assert found, [f"{one.where}: {one.what}" for one in raised.value.findings]
 
 
-def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
+def test_a_single_rise_stays_and_a_delay_shifts_it():
     run = prepare(driven(DRIVERS["late rise"]))
     assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(0.35), False)
     q, rate, _ = run.system.drive(run.values, "A", np.array([0.0, 0.05, 0.15, 0.25, 0.35, 2.0]))
@@ -262,7 +261,7 @@ def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
     np.testing.assert_allclose(rate, [0, 0, 2 * 1.7 / 0.2, 0, 0, 0], atol=1e-12)
 
 
-def test_a_periodic_table_may_gain_whole_turns() -> None:
+def test_a_periodic_table_may_gain_whole_turns():
     run = prepare(driven(DRIVERS["whole turns"]))
     time = np.linspace(0, 0.5, 40)
     here, there = (np.array(run.system.drive(run.values, "A", t)) for t in (time, time + 1.0))

@@ -2,20 +2,17 @@
 
 import copy
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mechanisms
 import trunnion
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from played import with_play
-from trunnion import Mechanism, analyse, read
+from trunnion import Mechanism, analyse
 from trunnion.cycle.findings import listed
 from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
 
@@ -24,12 +21,12 @@ components = st.floats(-1e4, 1e4).filter(lambda n: n == 0 or abs(n) > 1e-6)
 PINS = [CLEARANCE_MODELS["spatial"][kind] for kind in ("revolute", "cylindrical")]
 
 
-def vectors(count: int) -> Any:
+def vectors(count):
     return st.tuples(*[components] * count)
 
 
 @given(st.integers(1, 3).flatmap(vectors), radii, st.floats(1e-3, 1e3))
-def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rho: float, factor: float) -> None:
+def test_a_seat_depends_on_the_direction_of_the_load(load, rho, factor):
     """Odd, the same for any size of load, on the wall; in the middle without load."""
     seat = pressed(load, rho)
     size = float(np.linalg.norm(load))
@@ -44,7 +41,7 @@ def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rh
 
 
 @pytest.mark.parametrize("model", PINS)
-def test_a_force_at_one_end_of_a_pin_presses_there_alone(model: Any) -> None:
+def test_a_force_at_one_end_of_a_pin_presses_there_alone(model):
     """A force at z = ±H/2 has the moment r × F about mid-length; the other end feels nothing of it."""
     force, length = np.array([30.0, -40.0, 0.0]), 0.08
     for end, z in ((0, -length / 2), (1, length / 2)):
@@ -57,14 +54,14 @@ STEPS = 8
 clearances = st.floats(1e-7, 1e-4)
 
 
-def played(mechanism: Mechanism, *measures: str) -> xr.Dataset:
+def played(mechanism, *measures):
     return trunnion.play(mechanism, list(measures) or None, STEPS)
 
 
 @pytest.mark.slow
 @settings(max_examples=3)
 @given(st.lists(clearances, min_size=3, max_size=3))
-def test_joints_add_up(found: list[float]) -> None:
+def test_joints_add_up(found):
     """A joint's part is the same alone or beside others; the totals are the sum and the root of squares."""
     base, data, alone = mechanisms.four_bar(), mechanisms.four_bar(), []
     for joint, clearance in zip("BCD", found, strict=True):
@@ -84,7 +81,7 @@ def test_joints_add_up(found: list[float]) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "class III"])
-def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
+def test_which_link_has_the_hole_does_not_matter(name):
     """To first order: pins and holes changed over have the same worst case; a turn has the other sign."""
     data = mechanisms.MODELS[name]()
     turned = copy.deepcopy(data)
@@ -98,20 +95,17 @@ def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
     np.testing.assert_allclose(other["worst_case"], one["worst_case"], rtol=1e-9, atol=1e-18)
 
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+def changed(name, values):
+    return example(name).with_values(values)
 
 
-def changed(name: str, values: dict[str, float | str]) -> Mechanism:
-    return read(EXAMPLES / f"{name}.yaml").with_values(values)
-
-
-def told(result: xr.Dataset, what: str) -> list[dict[str, Any]]:
+def told(result, what):
     return [one for one in json.loads(result.attrs["findings"]) if one["code"] == what]
 
 
-def test_a_passage_is_told_once_however_few_the_positions() -> None:
+def test_a_passage_is_told_once_however_few_the_positions():
     """35.66° is 0.198 of two positions a turn."""
-    result = analyse(read(EXAMPLES / "fourbar-with-play.yaml"), steps=2)
+    result = analyse(example("fourbar-with-play"), steps=2)
     found = {one["where"]: one["figures"] for one in told(result, "contact.lost")}
     (together,) = [where for where, figures in found.items() if figures["at"] == "at 35.66°, at 223.5°"]
     assert "B" in together
@@ -120,9 +114,9 @@ def test_a_passage_is_told_once_however_few_the_positions() -> None:
 
 
 @pytest.mark.parametrize("steps", [7, 36])
-def test_a_measure_is_the_figure_of_the_summary_where_pins_cross_their_play(steps: int) -> None:
+def test_a_measure_is_the_figure_of_the_summary_where_pins_cross_their_play(steps):
     """Whichever positions are next to a crossing."""
-    data = read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data = example("fourbar-with-play").data()
     data["measures"] = {name: {"effort": "A", "as": name} for name in ("minimum", "maximum", "rms")}
     figures = {one.name: one.value for one in analyse(Mechanism(**data), steps=steps).trunnion.summary}
     for name, key in (("minimum", "effort_min"), ("maximum", "effort_max"), ("rms", "effort_rms")):
@@ -130,9 +124,9 @@ def test_a_measure_is_the_figure_of_the_summary_where_pins_cross_their_play(step
 
 
 @pytest.mark.slow
-def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
+def test_a_stretch_without_load_is_one_loss_of_contact():
     """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
-    data = read(EXAMPLES / "slider-crank.yaml").data()
+    data = example("slider-crank").data()
     data |= {"gravity": [0, 0], "joint_defaults": {"pin": {"clearance": "10 um"}, "seat": "loaded"}}
     for link in data["links"].values():
         for key in ("mass", "centre", "inertia"):
@@ -147,16 +141,16 @@ def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("steps", [36, 97, 360])
-def test_passages_are_found_between_wide_steps(steps: int) -> None:
+def test_passages_are_found_between_wide_steps(steps):
     """At 4.96° the load of end 1 turns round within 0.05 of its peak; seen over a wide step it does so far from 0."""
-    (finding,) = told(analyse(read(EXAMPLES / "rssr-with-play.yaml"), steps=steps), "contact.lost")
+    (finding,) = told(analyse(example("rssr-with-play"), steps=steps), "contact.lost")
     first, *more = finding["figures"]["at"].split(", ")
     assert 4.89 < float(first.removeprefix("at ").removesuffix("° (end 1)")) < 4.97
     assert more == ["at 191.6° (end 1)", "at 191.6° (end 2)"]
 
 
 @pytest.mark.parametrize(("pinch", "known"), [("0.05 mm", False), ("5 mm", True)])
-def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch: str, known: bool) -> None:
+def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch, known):
     """A ram touches its work with the pins on one side of their holes and not on the other: what flows is not known.
 
     Pressed by much more than the play, nearly all of the work is known: it is that of the spring.
@@ -185,7 +179,7 @@ def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch:
     assert figures["efficiency_ideal"].value is not None
 
 
-def test_many_places_are_told_by_how_often_and_the_ends() -> None:
+def test_many_places_are_told_by_how_often_and_the_ends():
     places = [f"at {k}°" for k in range(12)]
     assert listed(places[:3]) == "at 0°, at 1°, at 2°"
     assert listed(places) == "12 times, first at 0°, last at 11°"

@@ -1,7 +1,6 @@
 """What is no more than rounding is 0 in every figure, has no place and makes no finding, however large all is."""
 
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,18 +15,17 @@ from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.results.dataset import Scales, without_noise
 
-Data = dict[str, Any]
 SIZES = [(1.0, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]
 
 
-def sized(data: Data, length: float, force: float) -> Data:
+def sized(data, length, force):
     """A model with all its lengths and forces so many times as large, at the same angular speeds."""
     return in_units(data, length, force / length)
 
 
-def balanced(space: str = "planar") -> Data:
+def balanced(space="planar"):
     """A massless mechanism whose loads cancel but for rounding, rocked back and forth by its driver."""
-    moments: dict[str, Any] = {"a": 0.3, "b": -0.1, "c": -0.2}
+    moments = {"a": 0.3, "b": -0.1, "c": -0.2}
     if space == "spatial":
         data, link = rssr(friction=0.1).data, "rocker"
         moments = {name: [0.0, 0.0, moment] for name, moment in moments.items()}
@@ -38,7 +36,7 @@ def balanced(space: str = "planar") -> Data:
     return {**bare(data), "gravity": [0.0] * len(data["gravity"]), "loads": loads}
 
 
-def parallel() -> Data:
+def parallel():
     """A parallelogram, of which neither the coupler turns nor the distance of its pins changes."""
     return {
         "gravity": [0, -9.81],
@@ -61,7 +59,7 @@ def parallel() -> Data:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "size"), [*zip(cycle(("spatial", "planar")), SIZES, strict=False)])
-def test_forces_that_cancel_are_0_everywhere_and_no_finding(space: str, size: tuple[float, float]) -> None:
+def test_forces_that_cancel_are_0_everywhere_and_no_finding(space, size):
     result = trunnion.analyse(Mechanism(**sized(balanced(space), *size)), 24)
     for one in result.trunnion.summary:
         if one.unit in ("N", "N m", "W"):
@@ -72,13 +70,13 @@ def test_forces_that_cancel_are_0_everywhere_and_no_finding(space: str, size: tu
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_forces_that_cancel_leave_rounding(space: str) -> None:
+def test_forces_that_cancel_leave_rounding(space):
     """Else the test above would show nothing."""
     assert np.any(brief(Mechanism(**balanced(space)), 24)["drive_effort"].values != 0)
 
 
 @pytest.mark.parametrize(("length", "force"), SIZES)
-def test_a_measure_that_does_not_move_is_0(length: float, force: float) -> None:
+def test_a_measure_that_does_not_move_is_0(length, force):
     result = trunnion.analyse(Mechanism(**sized(parallel(), length, force)), 24)
     figures = {one.name: one.value for one in result.trunnion.summary}
     assert figures["tilt"] == figures["turn"] == 0
@@ -86,7 +84,7 @@ def test_a_measure_that_does_not_move_is_0(length: float, force: float) -> None:
 
 
 @pytest.mark.parametrize(("length", "force"), SIZES)
-def test_what_is_constant_has_no_place(length: float, force: float) -> None:
+def test_what_is_constant_has_no_place(length, force):
     """A gear pair whose torque, friction and margin are the same all the way round."""
     data = {
         "gravity": [0, 0],
@@ -105,10 +103,10 @@ def test_what_is_constant_has_no_place(length: float, force: float) -> None:
 
 
 @pytest.mark.parametrize(("length", "force"), SIZES)
-def test_largest_errors_are_where_they_are_of_any_size(length: float, force: float) -> None:
+def test_largest_errors_are_where_they_are_of_any_size(length, force):
     """A pin that lies on one side of a play of a ten thousandth."""
 
-    def largest(length: float, force: float) -> dict[str, tuple[float, str]]:
+    def largest(length, force):
         data = model(slider_crank(offset=0.0), friction=0.1)
         data["joints"]["B"] |= {"pin": {"radius": 0.005, "clearance": 1e-5}, "seat": {"xi": 0.5}}
         summary = trunnion.analyse(Mechanism(**sized(data, length, force)), 12).trunnion.summary
@@ -123,7 +121,7 @@ def test_largest_errors_are_where_they_are_of_any_size(length: float, force: flo
         assert value == pytest.approx(expected[name][0] * units.get(name, length), rel=1e-9)
 
 
-def test_joints_in_one_point_have_loads_and_losses() -> None:
+def test_joints_in_one_point_have_loads_and_losses():
     """The pins of a Cardan joint lie in one point, whose places are nothing but rounding."""
     axis, across = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
     out = [float(np.cos(0.35)), float(np.sin(0.35)), 0.0]
@@ -149,13 +147,13 @@ def test_joints_in_one_point_have_loads_and_losses() -> None:
     assert figures["K.end_load_max"] == pytest.approx(figures["K.reaction_moment_max"] / 0.04, rel=0.01)
 
 
-def test_a_sweep_tells_its_scales() -> None:
+def test_a_sweep_tells_its_scales():
     swept = trunnion.sweep(Mechanism(**balanced()), {"joint_defaults.friction.coefficient": [0.1, 0.2]}, steps=12)
     assert np.all(without_noise(swept)["drive_effort_max"].values == 0)
 
 
 @given(st.floats(1e-9, 1e9), st.floats(1e-6, 1e6), st.floats(1e-9, 1e9))
-def test_a_floor_follows_the_dimension_of_its_unit(length: float, rate: float, force: float) -> None:
+def test_a_floor_follows_the_dimension_of_its_unit(length, rate, force):
     floor, unit = Scales(length, rate, force).floor, Scales(1.0, 1.0, 1.0).floor("1")
     made = {"m": length, "mm": 1e3 * length, "1/s": rate, "rad/s": rate, "m/s^2": length * rate**2, "N": force,
             "N m": force * length, "W": force * length * rate, "kg m^2": force * length / rate**2,
@@ -167,7 +165,7 @@ def test_a_floor_follows_the_dimension_of_its_unit(length: float, rate: float, f
     assert Scales(length, 1e160, force).floor("m/s^2") == 0.0  # the rate squared is no number
 
 
-def test_a_speed_near_the_end_of_the_floats_has_an_answer() -> None:
+def test_a_speed_near_the_end_of_the_floats_has_an_answer():
     """What has no finite force is not a number or infinite; nothing is divided by a scale that is 0."""
     data = trunnion.read(DURANGO).data()
     data["drivers"]["A"] = {"speed": 1e301}

@@ -1,42 +1,37 @@
 """Loads of spatial models and losses of joints: by virtual work, closed forms, and the same as loads and dampers."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import trunnion
 from brief import brief
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from mechanisms_space import floating
 from timed import LINEAR, slider_crank, wheel
-from trunnion import Mechanism, MechanismError, read, simulate, sweep
+from trunnion import Mechanism, MechanismError, simulate, sweep
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12
 
 
-def massless(**changes: Any) -> Mechanism:
+def massless(**changes):
     """The RCCC of the examples without mass and friction, with other loads."""
-    data = trunnion.read(EXAMPLES / "rccc.yaml").with_friction("off").data()
+    data = example("rccc").with_friction("off").data()
     for key in ("links", "loads", "gravity"):
         del data[key]
     return Mechanism(**{**data, **changes})
 
 
-def joint(result: Any, quantity: str, name: str) -> Any:
+def joint(result, quantity, name):
     return result[quantity].sel(joint=name).values
 
 
-def drive(result: Any) -> Any:
+def drive(result):
     return result["drive_power"].values[0]
 
 
 @pytest.mark.parametrize("frame", ["global", "link"])
 @pytest.mark.parametrize("key", ["force", "moment"])
-def test_a_load_on_a_link_of_a_loop(frame: str, key: str) -> None:
+def test_a_load_on_a_link_of_a_loop(frame, key):
     """The drive takes what the load gives: F·v of the joint that it acts at, M·ω of its link."""
     vector = np.array([10.0, -20.0, 30.0])
     load = {"link": "rocker", "frame": frame, key: vector.tolist()} | ({"at": "C"} if key == "force" else {})
@@ -55,34 +50,31 @@ def test_a_load_on_a_link_of_a_loop(frame: str, key: str) -> None:
 
 
 @pytest.mark.parametrize(("key", "motion"), [("resisting_torque", "rotation"), ("resisting_force", "slide")])
-def test_a_cylindrical_joint_is_resisted_in_either_motion(key: str, motion: str) -> None:
+def test_a_cylindrical_joint_is_resisted_in_either_motion(key, motion):
     result = brief(massless(loads={"load": {"joint": "D", key: 7.0}}), STEPS)
     taken = 7.0 * np.abs(joint(result, f"joint_{motion}_velocity", "D"))
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * taken.max())
 
 
 @pytest.mark.parametrize("name", ["B", "D"])
-def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -> None:
+def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name):
     result = brief(massless(springs={"spring": {"joint": name, "preload": 2.0, "damping": 3.0}}), STEPS)
     rate = joint(result, "joint_rotation_velocity", name)
     taken = 2.0 * rate + 3.0 * rate**2
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
 
 
-LOSSES: dict[str, dict[str, Any]] = {
-    "S": {"constant": 20, "viscous": 3},
-    "Q": {"constant": "20 N mm", "viscous": "1e-3 N m s/rad"},
-}
+LOSSES = {"S": {"constant": 20, "viscous": 3}, "Q": {"constant": "20 N mm", "viscous": "1e-3 N m s/rad"}}
 
 
-def lossy(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism:
+def lossy(mechanism, losses):
     data = mechanism.data()
     for joint, one in losses.items():
         data["joints"][joint]["losses"] = one
     return Mechanism(**data)
 
 
-def loaded(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism:
+def loaded(mechanism, losses):
     """The same as loads and dampers."""
     data = mechanism.data()
     loads, springs = dict(data.get("loads", {})), dict(data.get("springs", {}))
@@ -100,11 +92,11 @@ def loaded(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism
     [
         (slider_crank(0.0), LOSSES),
         (slider_crank(0.1), LOSSES),
-        (read(EXAMPLES / "rssr.yaml"), {"D": {"constant": 2, "viscous": 0.3}}),
+        (example("rssr"), {"D": {"constant": 2, "viscous": 0.3}}),
     ],
     ids=["without friction", "with friction", "in space"],
 )
-def test_they_resist_as_loads_and_dampers_do(base: Mechanism, losses: dict[str, dict[str, Any]]) -> None:
+def test_they_resist_as_loads_and_dampers_do(base, losses):
     """All forces are equal, the intervals at rest too; their power is lost in the joint and is no load's."""
     one, other = brief(lossy(base, losses), 72), brief(loaded(base, losses), 72)
     same = ("drive_effort", "reaction_force", "drive_effort_lower", "drive_effort_upper", "useful_power", "status")
@@ -121,7 +113,7 @@ def test_they_resist_as_loads_and_dampers_do(base: Mechanism, losses: dict[str, 
     assert np.abs(one["power_residual"].values).max() < 1e-10 * float(np.abs(one["drive_power"]).max())
 
 
-def test_a_motion_in_time_has_them() -> None:
+def test_a_motion_in_time_has_them():
     """From the tables, which equal the walks; their work is friction's, and energy is kept."""
     one, other = (simulate(make(slider_crank(0.1), LOSSES), 0.1, 10) for make in (lossy, loaded))
     assert one["drive_rate"].values == pytest.approx(other["drive_rate"].values, rel=1e-7)
@@ -130,14 +122,14 @@ def test_a_motion_in_time_has_them() -> None:
     assert float(one["work_friction"][-1]) > float(other["work_friction"][-1]) + 0.5
 
 
-def test_a_constant_loss_holds_a_wheel_at_rest() -> None:
+def test_a_constant_loss_holds_a_wheel_at_rest():
     result = simulate(lossy(wheel({**LINEAR, "stall_effort": 0.5}, drag=0.0), {"A": {"constant": 0.6}}), 1.0, 2)
     (finding,) = result.trunnion.findings
     assert finding.code == "simulate.stays_at_rest"
     assert finding.figures["needed"] == pytest.approx(0.6)
 
 
-def test_the_compiled_engine_has_them() -> None:
+def test_the_compiled_engine_has_them():
     base, over = lossy(slider_crank(0.1), LOSSES), {"S.losses.constant": [0.0, 20.0], "Q.losses.viscous": [0.0, 1e-3]}
     one, other = (sweep(base, over, steps=36, engine=engine) for engine in ("numpy", "compiled"))
     for name in ("drive_effort_max", "friction_power_mean", "reaction_max"):
@@ -154,7 +146,7 @@ def test_the_compiled_engine_has_them() -> None:
         ("O", {"drag": 1}, "joints.O.losses.drag"),
     ],
 )
-def test_losses_that_make_no_sense_are_findings(joint: str, losses: dict[str, Any], where: str) -> None:
+def test_losses_that_make_no_sense_are_findings(joint, losses, where):
     with pytest.raises(MechanismError) as caught:
         lossy(slider_crank(), {joint: losses})
     assert where in [one.where for one in caught.value.findings]
@@ -163,7 +155,7 @@ def test_losses_that_make_no_sense_are_findings(joint: str, losses: dict[str, An
 LEAD = 6e-3 / (2 * np.pi)
 
 
-def jack(**load: Any) -> Mechanism:
+def jack(**load):
     """A driven screw of 6 mm pitch and 10 mm mean radius lifts a floating nut."""
     line, across = {"at": [0, 0, 0], "axis": [0, 0, 1]}, {"at": [0, 0, 0], "axis": [0, 1, 0]}
     links, joints = floating("nut")
@@ -191,7 +183,7 @@ def jack(**load: Any) -> Mechanism:
         ({"joint": "H", "resisting_torque": 3.0}, 3.0),
     ],
 )
-def test_a_thread_without_friction(load: dict[str, Any], torque: float) -> None:
+def test_a_thread_without_friction(load, torque):
     result = brief(jack(**load), STEPS)
     np.testing.assert_allclose(result["drive_effort"].values[0], torque, rtol=1e-12)
     slide, rotation = (joint(result, f"joint_{motion}_velocity", "H") for motion in ("slide", "rotation"))

@@ -1,40 +1,37 @@
 """Spatial groups by themselves: pairs in motion, closed form and general group, derivatives, balance of forces."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brief import brief
 from trunnion import Mechanism
 from trunnion.algebra.namespace import flat
-from trunnion.algebra.space import Frame, Screw, compose, element, relative
+from trunnion.algebra.space import Screw, compose, element, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.tree import OUTER, Element, GroupJoint, Pose
+from trunnion.groups.tree import OUTER, Element, GroupJoint
 from trunnion.joints import pairs
 
-Array = NDArray[np.float64]
 LANES = 400
 MOTIONS = pairs.MOTIONS["spatial"]
 LEAD = 0.013
 
 
-def random_frame(rng: np.random.Generator, lanes: int = 1, reach: float = 1.0) -> Frame:
+def random_frame(rng, lanes=1, reach=1.0):
     """Any frame; plain numbers for one lane."""
-    shape: Any = () if lanes == 1 else (lanes,)
+    shape = () if lanes == 1 else (lanes,)
     place, axis, x = (tuple(rng.normal(size=shape) for _ in range(3)) for _ in range(3))
-    return element(tuple(reach * n for n in place), axis, x)  # type: ignore[arg-type]
+    return element(tuple(reach * n for n in place), axis, x)
 
 
-def numbers(value: Any) -> Array:
+def numbers(value):
     return np.array(np.broadcast_arrays(*flat(value)), float)
 
 
 # the cylindrical dyad
-def dyad(sides: tuple[tuple[int, int], ...]) -> tuple[tuple[GroupJoint, ...], list[Element]]:
+def dyad(sides):
     """Three cylindrical joints and their elements: random links between random known axes that they can reach."""
     rng = np.random.default_rng(len(sides) + sum(map(sum, sides)))
     joints = tuple(GroupJoint("cylindrical", pair) for pair in sides)
@@ -57,7 +54,7 @@ SIDES = [((OUTER, 0), (0, 1), (1, OUTER)), ((0, OUTER), (1, 0), (OUTER, 1)), ((O
 
 
 @pytest.mark.parametrize("sides", SIDES)
-def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int, int], ...]) -> None:
+def test_the_closed_form_of_the_dyad_is_the_general_group(sides):
     joints, elements = dyad(sides)
     closed, general = CylindricalDyad(2, joints), SpatialGroup(2, joints)
     rng = np.random.default_rng(3)
@@ -84,7 +81,7 @@ def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int
     assert solved > LANES
 
 
-def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, loads: Any) -> Array:
+def answers(group, pose, outer, outer_second, loads):
     """Everything that a group finds, (number, lane)."""
     twists, seconds = group.moved(pose, outer, outer_second)
     return numbers((pose.frames, tuple(twists), tuple(seconds), tuple(group.reactions(pose, loads))))
@@ -93,7 +90,7 @@ def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, load
 # a link between two balls
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("reversed_", [False, True])
-def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_: bool) -> None:
+def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_):
     """A point off the line of its balls has the velocity of its places: the link does not spin on the way."""
     data = Mechanism.read(Path(__file__).parents[2] / "examples" / "rssr.yaml").data()
     data["links"]["rod"]["points"]["P"] = [0.05, 0.02, 0.01]

@@ -2,12 +2,9 @@
 
 import copy
 import functools
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brief import brief
 from mechanisms import in_units
@@ -16,12 +13,10 @@ from mechanisms_space import chain, rssr
 from trunnion import Mechanism, MechanismError, Status, analyse
 from trunnion.solve.run import prepare
 
-Array = NDArray[np.float64]
-Data = dict[str, Any]
 STEPS = 6
 
 
-def drawn(symbols: str) -> Data:
+def drawn(symbols):
     """A random chain with masses, loads, gravity and friction."""
     data = copy.deepcopy(chain(symbols, 300 + len(symbols)).data)
     for joint in data["joints"].values():
@@ -31,12 +26,12 @@ def drawn(symbols: str) -> Data:
 
 
 @functools.cache
-def unchanged(symbols: str) -> Any:
+def unchanged(symbols):
     """The result that those of the changed models are compared with, made once."""
     return brief(Mechanism(**drawn(symbols)), STEPS)
 
 
-def same(one: Any, two: Any, names: Sequence[str]) -> None:
+def same(one, two, names):
     """Equal within rounding."""
     for name in names:
         size = np.nanmax(np.abs(one[name].values), initial=1e-9)
@@ -46,7 +41,7 @@ def same(one: Any, two: Any, names: Sequence[str]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e6])
 @pytest.mark.parametrize("symbols", ["RSCR", "RCCC", "HCCC"])
-def test_micrometres_and_kilometres(symbols: str, length: float) -> None:
+def test_micrometres_and_kilometres(symbols, length):
     """All lengths times a factor at the same masses and times: forces times it, moments times its square."""
     one, two = unchanged(symbols), brief(Mechanism(**in_units(drawn(symbols), length)), STEPS)
     for name, power in (("drive_effort", 2), ("reaction_force", 1), ("reaction_moment", 2), ("friction_power", 2)):
@@ -55,7 +50,7 @@ def test_micrometres_and_kilometres(symbols: str, length: float) -> None:
 
 
 # welds
-def arm(*welds: tuple[str, float], **more: Any) -> Mechanism:
+def arm(*welds, **more):
     """A driven arm; what it carries is welded on at places along it, each with a height by which they do not meet."""
     held = {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}, **{name: [0.1 * k, 0, 0] for k, (name, _) in enumerate(welds)}}
     return Mechanism(
@@ -76,7 +71,7 @@ def arm(*welds: tuple[str, float], **more: Any) -> Mechanism:
     )  # fmt: skip
 
 
-def test_a_weld_carries_weight_and_centrifugal_force() -> None:
+def test_a_weld_carries_weight_and_centrifugal_force():
     result = brief(arm(("B", 0.0)), STEPS)
     force = result["reaction_force"].sel(joint="B").transpose("position", "axis").values
     np.testing.assert_allclose(force[0], [-2 * 0.2 * 9, 0, 2 * 9.81], rtol=0, atol=1e-12)
@@ -85,7 +80,7 @@ def test_a_weld_carries_weight_and_centrifugal_force() -> None:
 
 
 @pytest.mark.slow
-def test_two_welds_are_one_too_many() -> None:
+def test_two_welds_are_one_too_many():
     with pytest.raises(MechanismError, match="6 constraints are redundant, in the joints B, C"):
         analyse(arm(("B", 0.0), ("C", 0.0)), STEPS)
     result = analyse(arm(("B", 0.0), ("C", 0.0), over_constraint="minimum-norm"), STEPS)
@@ -93,14 +88,14 @@ def test_two_welds_are_one_too_many() -> None:
     np.testing.assert_allclose(total[0], [-2 * 0.2 * 9, 0, 2 * 9.81], rtol=0, atol=1e-12)
 
 
-def test_welds_that_do_not_meet_are_not_assembled() -> None:
+def test_welds_that_do_not_meet_are_not_assembled():
     result = brief(arm(("B", 0.0), ("C", 0.01), over_constraint="minimum-norm"), STEPS)
     assert (result["status"] == Status.NOT_ASSEMBLED).all()
     assert np.isnan(result["reaction_force"]).all()
 
 
 # slides alone, whose screws are the same at every position
-def test_a_wedge() -> None:
+def test_a_wedge():
     """Three slides at an angle β: held four times more than needed, F = −W tan β whatever the position."""
     beta = 0.4
     slope = {"at": [0, 0, 0], "axis": [np.cos(beta), 0, np.sin(beta)]}
@@ -124,7 +119,7 @@ def test_a_wedge() -> None:
 
 # free spins
 @pytest.mark.slow
-def test_a_driven_turn_is_no_free_spin() -> None:
+def test_a_driven_turn_is_no_free_spin():
     """A crank whose ball lies on its axis spins alone, but its driver holds that: the rocker stands still."""
     data = copy.deepcopy(rssr().data)
     data["links"]["crank"]["points"]["B"] = [0, 0, 0.01]

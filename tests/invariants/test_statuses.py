@@ -2,8 +2,6 @@
 
 import copy
 import sys
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,21 +20,20 @@ from mechanisms import (
     slider_crank,
     watt_six_bar,
 )
-from mechanisms_parts import bare, slide
+from mechanisms_parts import bare, example, slide
 from trunnion import FrictionMethod, Mechanism, MechanismError, Status
 from trunnion.errors import Severity
 from trunnion.model.checks.check import check_values
-from trunnion.model.parameters import ParameterSet
 
 FORCES = ["drive_effort", "drive_effort_lower", "drive_effort_upper", "reaction_force", "friction_power", "drive_power"]
 
 
-def texts(result: Any) -> str:
+def texts(result):
     return "\n".join(f"{row['severity']} {row['where']} {row['what']}" for row in findings(result))
 
 
 # cannot be assembled
-def test_not_assembled_over_part_of_the_turn() -> None:
+def test_not_assembled_over_part_of_the_turn():
     """|BD| = √(1 + 0.64 − 1.6 cos q) reaches BC + CD = 1.15 at one angle: values before it, NaN beyond."""
     result = analyse(four_bar(0.8, 0.65, 0.5, 1.0), 360)
     limit = np.degrees(np.arccos((1 + 0.64 - 1.15**2) / 1.6))
@@ -61,7 +58,7 @@ def test_not_assembled_over_part_of_the_turn() -> None:
 
 
 @pytest.mark.parametrize("start", ["0 deg", "90 deg", "270 deg"])
-def test_extremes_are_of_the_range_that_holds_the_start_and_the_others_are_named(start: str) -> None:
+def test_extremes_are_of_the_range_that_holds_the_start_and_the_others_are_named(start):
     """A rocker of 4, coupler 6, output 3 and ground 5.5 closes for |BD| from 3 to 9: in two ranges of a turn."""
     data = model(four_bar(4.0, 6.0, 3.0, 5.5), friction=None)
     data["drivers"]["A"] = {"speed": 1.0, "start": start}
@@ -79,7 +76,7 @@ def test_extremes_are_of_the_range_that_holds_the_start_and_the_others_are_named
     ("lengths", "ever", "why"),
     [((0.8, 1.5, 0.5, 1.0), True, "falls short of |BC − CD|"), ((0.1, 0.2, 0.2, 1.0), False, "at any position")],
 )
-def test_why_it_is_not_assembled(lengths: tuple[float, ...], ever: bool, why: str) -> None:
+def test_why_it_is_not_assembled(lengths, ever, why):
     result = analyse(four_bar(*lengths), 36)
     assert why in texts(result)
     assert np.any(result["status"] == Status.NOT_ASSEMBLED)
@@ -88,7 +85,7 @@ def test_why_it_is_not_assembled(lengths: tuple[float, ...], ever: bool, why: st
 
 
 @pytest.mark.slow
-def test_general_group_not_assembled_over_part_of_the_turn() -> None:
+def test_general_group_not_assembled_over_part_of_the_turn():
     """A rod shorter than the crank reaches the guide only where |r sin q| ≤ l; both parts of the turn count."""
     r, length = 0.5, 0.4
     result = analyse(slider_crank(r, length, 0.0), 120)
@@ -107,7 +104,7 @@ def test_general_group_not_assembled_over_part_of_the_turn() -> None:
 
 # dead centres
 @pytest.mark.parametrize("kind", ["RRR", "general"])
-def test_exactly_at_a_dead_centre(kind: str) -> None:
+def test_exactly_at_a_dead_centre(kind):
     """Crank and coupler (or rod) in line, the other end driven: SINGULAR or open there, no numbers for forces."""
     if kind == "RRR":  # rocker drives; at its extreme |AC| = AB + BC exactly: A (0,0), D (1,0), a 3-4-5 triangle
         data = four_bar(0.2, 0.6, 0.6, 1.0)
@@ -130,7 +127,7 @@ def test_exactly_at_a_dead_centre(kind: str) -> None:
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("method", [None, FrictionMethod("successive-approximation", 1e-9)])
 @pytest.mark.parametrize("name", ["slider-crank", "Stephenson six-bar", "inverted slider-crank"])
-def test_chunks_are_invisible(name: str, method: FrictionMethod | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_are_invisible(name, method, monkeypatch):
     """Solved 7 at a time or all together: every variable the same, condition included."""
 
     whole = analyse(MODELS[name](), 60, method)
@@ -145,7 +142,7 @@ def test_chunks_are_invisible(name: str, method: FrictionMethod | None, monkeypa
 
 
 @pytest.mark.parametrize("steps", [0, -3, 10**7 + 1])
-def test_a_number_of_positions_that_memory_cannot_hold(steps: int) -> None:
+def test_a_number_of_positions_that_memory_cannot_hold(steps):
     with pytest.raises(MechanismError) as error:
         trunnion.analyse(build(four_bar()), steps)
     (finding,) = error.value.findings
@@ -153,7 +150,7 @@ def test_a_number_of_positions_that_memory_cannot_hold(steps: int) -> None:
     assert finding.remedy == "give a whole number from 1 to 10,000,000, for all positions are held in memory"
 
 
-def test_massless_and_unloaded() -> None:
+def test_massless_and_unloaded():
     """Nothing acts: all forces are 0, not NaN, and nothing is said to be locked."""
     result = trunnion.analyse(Mechanism(**bare(model(four_bar())) | {"gravity": [0, 0]}), 24)
     assert np.all(result["status"] <= Status.ZERO_SLIP)
@@ -162,7 +159,7 @@ def test_massless_and_unloaded() -> None:
     assert np.isnan(float(result["efficiency"]))
 
 
-def test_range_includes_both_ends() -> None:
+def test_range_includes_both_ends():
     data = four_bar()
     data["drivers"]["A"] = {"speed": -2.0, "range": [1.0, -0.5]}
     result = positions_of(data, 4)
@@ -174,7 +171,7 @@ def test_range_includes_both_ends() -> None:
     assert "range" in str(error.value)
 
 
-def test_too_few_rounds_is_said() -> None:
+def test_too_few_rounds_is_said():
     """Three rounds at a criterion they cannot meet: NOT_CONVERGED and NaN, not the third guess."""
     result = analyse(four_bar(), 12, FrictionMethod("successive-approximation", 1e-9, 3))
     assert np.all(result["status"] == Status.NOT_CONVERGED)
@@ -183,7 +180,7 @@ def test_too_few_rounds_is_said() -> None:
     assert "did not converge" in texts(result)
 
 
-def test_assemblies_that_coincide_over_a_range_are_told_by_its_ends() -> None:
+def test_assemblies_that_coincide_over_a_range_are_told_by_its_ends():
     """Coupler and rocker lie on the crank at every angle: A and D are at one place, and their lengths add up to it."""
     data = four_bar(0.04, 0.025, 0.015, 0.04)
     data["links"]["ground"]["points"]["D"] = [0.0, 0.0]
@@ -193,7 +190,7 @@ def test_assemblies_that_coincide_over_a_range_are_told_by_its_ends() -> None:
 
 
 @pytest.mark.parametrize("branch", [1, -1])
-def test_a_hint_on_a_joint_of_a_later_group_counts(branch: int) -> None:
+def test_a_hint_on_a_joint_of_a_later_group_counts(branch):
     """F joins the rocker to a later dyad: its place tells the assemblies of the rocker's own dyad apart."""
     data = watt_six_bar()
     data["assembly"]["C"][1] *= branch
@@ -205,7 +202,7 @@ def test_a_hint_on_a_joint_of_a_later_group_counts(branch: int) -> None:
     assert not any(row["code"] == "assembly.choice" for row in findings(hinted))
 
 
-def test_a_driven_rotation_is_the_prescribed_coordinate() -> None:
+def test_a_driven_rotation_is_the_prescribed_coordinate():
     """Whole turns, a start beyond half a turn and coarse steps included."""
     data = five_bar()
     data["drivers"]["E"] |= {"speed": -20.0, "start": 3.5}
@@ -213,7 +210,7 @@ def test_a_driven_rotation_is_the_prescribed_coordinate() -> None:
     np.testing.assert_allclose(result["joint_rotation"].sel(joint="E"), 3.5 - 20.0 * result["time"], rtol=1e-13)
 
 
-def test_angles_follow_their_rate_across_coarse_steps() -> None:
+def test_angles_follow_their_rate_across_coarse_steps():
     """A link that turns 0.9 turns a step is not taken to turn back 0.1."""
     data = four_bar()
     data["drivers"]["A"] |= {"range": [0.0, 36 * np.pi * 0.9]}
@@ -221,35 +218,28 @@ def test_angles_follow_their_rate_across_coarse_steps() -> None:
     np.testing.assert_allclose(np.diff(crank), 2 * np.pi * 0.9, rtol=1e-12)
 
 
-EXAMPLES = Path(__file__).parent.parent.parent / "examples"
-
-
-def example(name: str) -> trunnion.Mechanism:
-    return trunnion.read(EXAMPLES / f"{name}.yaml")
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["durango-fourbar", "fourbar-with-play", "rssr"])
-def test_an_analysis_again_is_that_of_a_mechanism_read_anew(name: str) -> None:
+def test_an_analysis_again_is_that_of_a_mechanism_read_anew(name):
     mechanism = example(name)
     trunnion.analyse(mechanism, 12)
     again, anew = trunnion.analyse(mechanism, 36), trunnion.analyse(example(name), 36)
     assert again.identical(anew)
 
 
-WRONG: list[dict[str, Any]] = [
+WRONG = [
     {"links.crank.mass": -1.0}, {"joints.B.pin.radius": 0.0},
     {"joints.B.friction.coefficient": -0.1, "links.coupler.mass": -2.0}, {"drivers.A.speed": 0.0},
     {"links.coupler.inertia": -1.0}, {"links.coupler.points.C.x": 0.0, "links.coupler.points.C.y": 0.0},
     {"AB": 1.9, "joint_defaults.friction.coefficient": -7.0},
 ]  # fmt: skip
-SOUND: list[dict[str, Any]] = [{"AB": 1.9}, {"AB": float("nan")}]
+SOUND = [{"AB": 1.9}, {"AB": float("nan")}]
 
 
 @pytest.mark.parametrize("change", [*WRONG, *SOUND], ids=lambda change: " ".join(change))
-def test_errors_of_changed_numbers_are_found_among_these_alone(change: dict[str, Any]) -> None:
+def test_errors_of_changed_numbers_are_found_among_these_alone(change):
     mechanism = example("durango-fourbar")
-    numbers: ParameterSet = copy.copy(mechanism.parameter_set)
+    numbers = copy.copy(mechanism.parameter_set)
     before = dict(numbers.nominal)
     numbers.nominal = mechanism.parameters(change)
     changed = [path for path, value in numbers.nominal.items() if value is not before[path]]
@@ -262,7 +252,7 @@ def test_errors_of_changed_numbers_are_found_among_these_alone(change: dict[str,
     assert bool(own) == any(change is one for one in WRONG)
 
 
-def test_inertia_about_the_origin() -> None:
+def test_inertia_about_the_origin():
     """The same body stated about its own origin: J_O = J_S + m r²."""
     data, other = four_bar(), four_bar()
     for link in other["links"].values():

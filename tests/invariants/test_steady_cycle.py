@@ -1,16 +1,13 @@
 """Steady cycles, motions of many samples, and loads by place and speed, in time and over a cycle."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
 import trunnion
 from brief import brief
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from timed import LINEAR, mass_on_a_belt, slider_crank, wheel
-from trunnion import MechanismError, analyse, read, simulate, sweep
+from trunnion import MechanismError, analyse, simulate, sweep
 from trunnion.dynamics.measured import FIGURES, figures_in_time
 from trunnion.dynamics.steady_cycle import UnsteadyError
 from trunnion.errors import Status
@@ -18,11 +15,11 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 
 
-def figures(result: Any) -> dict[str, float]:
+def figures(result):
     return {one.name: one.value for one in result.trunnion.summary}
 
 
-def shaker(inertia: float, **motor: Any) -> trunnion.Mechanism:
+def shaker(inertia, **motor):
     """A motor with an unbalance of 2 kg at 50 mm on a carriage of 10 kg, on a spring and a damper."""
     slide = {"at": [0, 0], "axis": [1, 0]}
     return trunnion.Mechanism(
@@ -42,7 +39,7 @@ def shaker(inertia: float, **motor: Any) -> trunnion.Mechanism:
     )  # fmt: skip
 
 
-def test_a_wheel_with_a_direct_current_motor() -> None:
+def test_a_wheel_with_a_direct_current_motor():
     """T_s (1 − ω/ω₀) = drag, so ω = 150 (1 − 0.6/4) = 127.5; a difference decays as e^(−t T_s/(J ω₀)), over 2π/ω."""
     told = figures(trunnion.simulate(wheel(LINEAR), steps=12, steady=True))
     assert told["A.speed_mean"] == pytest.approx(127.5, rel=1e-9)
@@ -54,7 +51,7 @@ def test_a_wheel_with_a_direct_current_motor() -> None:
     assert backward["A.speed_mean"] == pytest.approx(127.5, rel=1e-9)
 
 
-def test_a_controller_holds_the_speed_with_its_integral() -> None:
+def test_a_controller_holds_the_speed_with_its_integral():
     """No error is left: ω is the target, and the integral gives the drag."""
     servo = {"kind": "speed-control", "target": 100, "proportional": 0.5, "integral": 2, "limit": 5}
     result = trunnion.simulate(wheel(servo), steps=12, steady=True)
@@ -62,7 +59,7 @@ def test_a_controller_holds_the_speed_with_its_integral() -> None:
     assert result["drive_effort"].values == pytest.approx(0.6, rel=1e-9)
 
 
-def test_an_unbalanced_rotor_shakes_its_carriage() -> None:
+def test_an_unbalanced_rotor_shakes_its_carriage():
     """Forced vibration: X = m e ω²/√((k − M ω²)² + (c ω)²); the motor gives what the damper takes, T ω = c (X ω)²/2.
 
     The inertia of the rotor holds its speed even, to m e X/J = 3e-7.
@@ -77,7 +74,7 @@ def test_an_unbalanced_rotor_shakes_its_carriage() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, pytest.param(0.1, marks=pytest.mark.slow)])
-def test_the_motion_goes_on_as_it_is(friction: float) -> None:
+def test_the_motion_goes_on_as_it_is(friction):
     """Integrated on from the first position of the cycle it repeats; works and efforts are those of the cycle."""
     data = slider_crank(friction).data()
     data["drivers"]["O"]["initial"] = {"speed": 118}
@@ -107,7 +104,7 @@ def test_the_motion_goes_on_as_it_is(friction: float) -> None:
         (wheel({"kind": "constant", "effort": 1}, drag=0.5), "simulate.not_repeating"),
     ],
 )
-def test_no_steady_cycle_is_told_with_its_cause(made: trunnion.Mechanism, code: str) -> None:
+def test_no_steady_cycle_is_told_with_its_cause(made, code):
     with pytest.raises(UnsteadyError) as told:
         trunnion.simulate(made, steady=True)
     assert told.value.findings[0].code == code
@@ -122,7 +119,7 @@ def test_no_steady_cycle_is_told_with_its_cause(made: trunnion.Mechanism, code: 
         (mass_on_a_belt(), "drivers.B"),
     ],
 )
-def test_what_cannot_be_a_cycle_is_refused(made: trunnion.Mechanism, where: str) -> None:
+def test_what_cannot_be_a_cycle_is_refused(made, where):
     with pytest.raises(trunnion.MechanismError) as told:
         trunnion.simulate(made, steady=True)
     assert told.value.findings[0].where == where
@@ -132,7 +129,7 @@ TURN = 2 * np.pi
 AGREED = 1e-6  # relative
 
 
-def spread(mechanism: Mechanism, count: int, **numbers: float) -> dict[str, Any]:
+def spread(mechanism, count, **numbers):
     """Numbers that scatter by a share of themselves, (sample, 1)."""
     draw, nominal = np.random.default_rng(1), mechanism.parameters()
     shares = {name.replace("__", "."): share for name, share in numbers.items()}
@@ -140,17 +137,17 @@ def spread(mechanism: Mechanism, count: int, **numbers: float) -> dict[str, Any]
     return dict(mechanism.parameters(moved))
 
 
-def test_flywheels_with_inertias_of_their_own() -> None:
+def test_flywheels_with_inertias_of_their_own():
     """J ω̇ = 4 (1 − ω/150) − 0.6: ω = 127.5 (1 − e^(−t/τ)), τ = J 150/4, of every sample."""
     mechanism, count, duration = wheel(LINEAR), 5, 12.0
     inertia = 0.05 * np.linspace(0.5, 2.0, count)[:, None]
     values = dict(mechanism.parameters({"links.wheel.inertia": inertia}))
     tau = inertia[:, 0] * 150 / 4
 
-    def gone(time: Any) -> Any:
+    def gone(time):
         return 127.5 * (time - tau * (1 - np.exp(-time / tau)))
 
-    def when(angle: Any) -> Any:
+    def when(angle):
         time = np.ones_like(angle)
         for _ in range(50):
             time = time - (gone(time) - angle) / (127.5 * (1 - np.exp(-time / tau)))
@@ -165,7 +162,7 @@ def test_flywheels_with_inertias_of_their_own() -> None:
 
 
 @pytest.mark.parametrize(("effort", "starts"), [(0.5, False), (0.7, True)])
-def test_what_is_larger_at_rest_holds_every_one(effort: float, starts: bool) -> None:
+def test_what_is_larger_at_rest_holds_every_one(effort, starts):
     """A pin with 0.2 N m of sliding and 0.6 N m at rest: φ = ½ α t² under the rest of the torque."""
     data, duration = wheel({"kind": "constant", "effort": effort}, drag=0.0).data(), 12.0
     data["gravity"], data["links"]["wheel"]["mass"] = [0, -10], 10
@@ -180,7 +177,7 @@ def test_what_is_larger_at_rest_holds_every_one(effort: float, starts: bool) -> 
 
 
 # against each by itself
-MOTORS: dict[str, dict[str, Any]] = {
+MOTORS = {
     "linear": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3},
     "geared": {
         "kind": "induction", "breakdown_effort": 5, "breakdown_slip": 0.3, "synchronous_speed": 300, "ratio": 2,
@@ -195,7 +192,7 @@ MOTORS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MOTORS)
-def test_together_as_each_by_itself(name: str) -> None:
+def test_together_as_each_by_itself(name):
     """Every kind of motor, with its own numbers varied, on a slider-crank with friction and a load that resists."""
     mechanism = slider_crank(0.05, drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS[name]}})
     motor = [path for path in mechanism.parameters() if ".motor." in path and not path.endswith(("_from", "until"))]
@@ -210,7 +207,7 @@ def test_together_as_each_by_itself(name: str) -> None:
     assert np.all(np.isfinite(together["peak_effort"]))
 
 
-def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
+def test_numbers_that_were_nothing_or_one_are_looked_at_anew():
     """Machine code has some 0 and 1 built in; motions with other numbers do not take it."""
     mechanism = slider_crank(0.05)
     run, values = prepare(mechanism), mechanism.parameters()
@@ -226,7 +223,6 @@ def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
     assert abs(second - first) > 1e-6 * second
 
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 # the height of the ram by the crank angle, and by the motion of its joint and its point
 HEIGHTS = {
     "drive": "(0.035 m * cos(drive) + sqrt((0.12 m)^2 - (0.035 m * sin(drive))^2))", "slide": "S.slide",
@@ -236,13 +232,13 @@ HEIGHTS = {
 PRESS = "-30 N - 4000 N/m * ({0} - 0.11 m) - 500 N/m * abs({0} - 0.13 m) - 100 N * between({0}, 0.1 m, 0.12 m)"
 
 
-def pressed(force: str, **more: Any) -> Mechanism:
+def pressed(force, **more):
     return slider_crank(0.1, loads={"work": {"link": "piston", "at": "Q", "force": [force, 0]}}, **more)
 
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slide", "distance", "point"])
-def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
+def test_a_press_force_over_the_height_of_the_ram(name):
     """It equals the same force stated over the crank angle, at every position and in the means."""
     one, other = (analyse(pressed(PRESS.format(HEIGHTS[key])), 90) for key in (name, "drive"))
     bare = analyse(slider_crank(0.1, loads={}), 90)
@@ -253,7 +249,7 @@ def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
         assert one[key].values == pytest.approx(other[key].values, rel=0, abs=1e-12 * size), key
 
 
-def test_a_driven_joint_turns_as_the_drive_does() -> None:
+def test_a_driven_joint_turns_as_the_drive_does():
     """In time its turns begin again, so that a wave over the angle is one at every turn."""
     one, other = (brief(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))
     assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, rel=1e-12)
@@ -264,9 +260,9 @@ def test_a_driven_joint_turns_as_the_drive_does() -> None:
     assert 0.5 * 0.05 * rate**2 == pytest.approx(turned + 0.5 * (np.cos(turned) - 1), abs=1e-7)
 
 
-def test_in_space() -> None:
+def test_in_space():
     """A torque that resists by the rate of its joint is a damper's."""
-    data = read(EXAMPLES / "rssr.yaml").data()
+    data = example("rssr").data()
     last = [name for name, one in data["joints"].items() if one["type"] == "revolute"][-1]
     resisted = {"joint": last, "resisting_torque": f"0.3 N m s/rad * abs({last}.rotation_velocity)"}
     one = brief(Mechanism(**{**data, "loads": {"oil": resisted}}), 24)
@@ -275,7 +271,7 @@ def test_in_space() -> None:
     assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, abs=1e-12 * largest)
 
 
-def test_the_compiled_engine_has_them() -> None:
+def test_the_compiled_engine_has_them():
     model = pressed(PRESS.format("S.slide"))
     one, other = (sweep(model, {"rod.mass": [0.4, 0.5]}, steps=36, engine=engine) for engine in ("numpy", "compiled"))
     assert other["drive_effort_max"].values == pytest.approx(one["drive_effort_max"].values, rel=1e-9)
@@ -290,7 +286,7 @@ def test_the_compiled_engine_has_them() -> None:
         ("-50 N * S.slide", "force"),
     ],
 )
-def test_a_name_that_means_nothing_is_one_finding(force: str, remedy: str) -> None:
+def test_a_name_that_means_nothing_is_one_finding(force, remedy):
     with pytest.raises(MechanismError) as caught:
         pressed(force)
     (finding,) = caught.value.findings
@@ -299,7 +295,7 @@ def test_a_name_that_means_nothing_is_one_finding(force: str, remedy: str) -> No
 
 
 @pytest.mark.parametrize(("free_length", "rows"), [(0.0, 0), (0.01, 1)])
-def test_a_spring_whose_ends_meet_at_the_start(free_length: float, rows: int) -> None:
+def test_a_spring_whose_ends_meet_at_the_start(free_length, rows):
     """Without a free length x = v/w sin w t; with one there is no direction at 0 s, which is said and marked."""
     slide = {"at": [0, 0], "axis": [1, 0]}
     block = Mechanism(

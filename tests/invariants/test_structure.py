@@ -1,7 +1,5 @@
 """Decomposition: order of modules, class, formula, what is said where drivers do not determine the motion; graphs."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from benchmarks.studio import chain
@@ -11,11 +9,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 import trunnion
-from mechanisms import MODELS, Data, build, four_bar, model
+from mechanisms import MODELS, build, four_bar, model
 from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError
 from trunnion.model.file import entries_of
-from trunnion.structure.decompose import Plan, decompose, mobility_by_rank
+from trunnion.structure.decompose import decompose, mobility_by_rank
 from trunnion.structure.graph import components, longest_loop, matching
 
 FORMULAS = {
@@ -34,7 +32,7 @@ FORMULAS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_plan_has_its_formula_and_is_a_partition_in_causal_order(name: str) -> None:
+def test_a_plan_has_its_formula_and_is_a_partition_in_causal_order(name):
     mechanism = build(MODELS[name]())
     plan = decompose(mechanism)
     assert plan.formula == FORMULAS[name]
@@ -42,7 +40,7 @@ def test_a_plan_has_its_formula_and_is_a_partition_in_causal_order(name: str) ->
     _check_plan(mechanism, plan)
 
 
-def _check_plan(mechanism: Mechanism, plan: Plan) -> None:
+def _check_plan(mechanism, plan):
     """Every link and joint once; every module hangs on the ground or on earlier links; each counts as a group."""
     links = [link for module in plan.modules for link in module.links]
     joints = [joint for module in plan.modules for joint in module.joints]
@@ -57,10 +55,10 @@ def _check_plan(mechanism: Mechanism, plan: Plan) -> None:
     assert plan.formula == " → ".join(module.label for module in plan.modules)
 
 
-def loose_chain(links: Sequence[str], joints: Sequence[tuple[str, str]], drivers: Sequence[int]) -> Data:
+def loose_chain(links, joints, drivers):
     """A planar mechanism of pins only, whose geometry does not matter."""
     rng = np.random.default_rng(0)
-    data: Data = {"links": {link: {"points": {}} for link in links}, "joints": {}, "drivers": {}}
+    data = {"links": {link: {"points": {}} for link in links}, "joints": {}, "drivers": {}}
     for k, pair in enumerate(joints):
         name = f"J{k}"
         for link in pair:
@@ -71,7 +69,7 @@ def loose_chain(links: Sequence[str], joints: Sequence[tuple[str, str]], drivers
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_random_assur_chains(seed: int) -> None:
+def test_random_assur_chains(seed):
     """Mechanisms grown group by group from drivers, dyads and triads on random links come apart into these again."""
     rng = np.random.default_rng(seed)
     links, joints, drivers, expected = ["ground"], [], [], []
@@ -119,12 +117,12 @@ DRIVEN_ELSEWHERE = {  # the mechanism, its driver, the formula
 
 
 @pytest.mark.parametrize("name", DRIVEN_ELSEWHERE)
-def test_the_driver_decides_the_modules(name: str) -> None:
+def test_the_driver_decides_the_modules(name):
     data, formula = DRIVEN_ELSEWHERE[name]
     assert decompose(Mechanism(**model(data))).formula == formula
 
 
-def parallelogram(third: float) -> Data:
+def parallelogram(third):
     """With a third crank, beside the two or off their line."""
     return {
         "links": {
@@ -171,7 +169,7 @@ WRONG = {  # and what is said
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_not_determined_is_refused_with_its_cause(name: str) -> None:
+def test_what_is_not_determined_is_refused_with_its_cause(name):
     data, words = WRONG[name]
     with pytest.raises(MechanismError) as error:
         trunnion.analyse(Mechanism(**data), 4)
@@ -180,7 +178,7 @@ def test_what_is_not_determined_is_refused_with_its_cause(name: str) -> None:
 
 @pytest.mark.parametrize("shift", [0.0, 1e4, 1e6])
 @pytest.mark.parametrize(("off", "mobility"), [(0.0, 1), (0.1, 0)])
-def test_rank_of_a_parallelogram_of_three_cranks(shift: float, off: float, mobility: int) -> None:
+def test_rank_of_a_parallelogram_of_three_cranks(shift, off, mobility):
     """Rank of the joints' constraints, taken alone: 1 where Grübler says 0, wherever the drawing has its origin."""
     c, s = 0.5 * np.cos(0.7), 0.5 * np.sin(0.7)
     at = {"A": (0, 0), "B": (c, s), "C": (2 + c, s), "D": (2, 0), "G": (1, off), "H": (1 + c, s)}
@@ -191,7 +189,7 @@ def test_rank_of_a_parallelogram_of_three_cranks(shift: float, off: float, mobil
 
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("name", MODELS)
-def test_check(name: str) -> None:
+def test_check(name):
     """Both mobilities agree on ordinary linkages, and nothing is wrong with them."""
     found = trunnion.check(build(MODELS[name]()), 36)
     assert found.mobility == found.rank_mobility == len(MODELS[name]()["drivers"])
@@ -199,7 +197,7 @@ def test_check(name: str) -> None:
     assert len(found.assemblies) == len(found.plan.modules)
 
 
-def test_mobility_by_rank_of_a_long_row() -> None:
+def test_mobility_by_rank_of_a_long_row():
     found = trunnion.check(Mechanism(**entries_of(chain(120))[0]), 1)
     assert found.mobility == found.rank_mobility == 1
 
@@ -208,7 +206,7 @@ COUNTS = st.integers(1, 12)
 
 
 @st.composite
-def relations(draw: st.DrawFn, square: bool = False) -> np.ndarray:
+def relations(draw, square=False):
     """Which of n rows is related to which of m columns."""
     rows = draw(COUNTS)
     columns = rows if square else draw(COUNTS)
@@ -216,12 +214,12 @@ def relations(draw: st.DrawFn, square: bool = False) -> np.ndarray:
     return np.array(bits, dtype=np.int8).reshape(rows, columns)
 
 
-def lists(relation: np.ndarray) -> list[list[int]]:
+def lists(relation):
     return [np.flatnonzero(row).tolist() for row in relation]
 
 
 @given(relations())
-def test_as_many_rows_are_matched_as_can_be(relation: np.ndarray) -> None:
+def test_as_many_rows_are_matched_as_can_be(relation):
     """No column twice, only columns that suit, and as many as SciPy's Hopcroft-Karp matches."""
     found = matching(lists(relation), relation.shape[1])
     taken = [(row, column) for row, column in enumerate(found) if column >= 0]
@@ -231,13 +229,13 @@ def test_as_many_rows_are_matched_as_can_be(relation: np.ndarray) -> None:
 
 
 @given(relations(square=True))
-def test_components_are_those_of_scipy(relation: np.ndarray) -> None:
+def test_components_are_those_of_scipy(relation):
     count, labels = connected_components(csr_array(relation), directed=True, connection="strong")
     found = components(lists(relation))
     assert len(set(zip(found, labels.tolist(), strict=True))) == count == len(set(found))
 
 
-def test_a_long_chain_and_a_long_loop() -> None:
+def test_a_long_chain_and_a_long_loop():
     """Twenty thousand nodes: no recursion."""
     n = 20_000
     assert sorted(components([[i + 1] for i in range(n - 1)] + [[]])) == list(range(n))
@@ -245,7 +243,7 @@ def test_a_long_chain_and_a_long_loop() -> None:
     assert matching([[i] for i in range(n)], n) == list(range(n))
 
 
-def loops_up_to(edges: list[tuple[int, int]], most: int) -> list[int]:
+def loops_up_to(edges, most):
     """All loops of at most so many edges, each a set of edges as bits."""
     number = {pair: 1 << k for k, edge in enumerate(edges) for pair in (edge, edge[::-1])}
     ways = [([start], 0) for start in {node for edge in edges for node in edge}]
@@ -261,9 +259,9 @@ def loops_up_to(edges: list[tuple[int, int]], most: int) -> list[int]:
     return list(loops)
 
 
-def independent(rows: list[int]) -> int:
+def independent(rows):
     """How many sets of edges do not follow from others."""
-    basis: list[int] = []
+    basis = []
     for row in rows:
         for other in basis:
             row = min(row, row ^ other)
@@ -272,7 +270,7 @@ def independent(rows: list[int]) -> int:
 
 
 @given(st.sets(st.tuples(st.integers(0, 6), st.integers(0, 6)).filter(lambda pair: pair[0] < pair[1]), max_size=12))
-def test_loops_up_to_the_longest_span_all_and_shorter_ones_do_not(pairs: set[tuple[int, int]]) -> None:
+def test_loops_up_to_the_longest_span_all_and_shorter_ones_do_not(pairs):
     edges = sorted(pairs)
     longest, all_of_them = longest_loop(edges), independent(loops_up_to(edges, 7))
     assert independent(loops_up_to(edges, longest)) == all_of_them

@@ -3,31 +3,23 @@
 import itertools
 import json
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
 from manual.conftest import Run, program  # noqa: F401
+from mechanisms_parts import EXAMPLES, example
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep import FIGURES, Points
 from trunnion.studies.sweep_grid import grid as grid_of
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CARDAN = EXAMPLES / "pezzuti-cardan.yaml"
 STEPS = 24
-Values = dict[str, list[Any]]
 
 
-def read(name: str) -> Mechanism:
-    return trunnion.read(EXAMPLES / f"{name}.yaml")
-
-
-def expected(result: xr.Dataset) -> dict[str, Any]:
+def expected(result):
     """The figures of one cycle, from the definitions and the Dataset of `analyse`."""
     status = result["status"].values
     kept = np.flatnonzero(status == Status.SOLVED)
@@ -36,7 +28,7 @@ def expected(result: xr.Dataset) -> dict[str, Any]:
     size = np.sqrt((result["reaction_force"].values ** 2).sum(axis=1))
     told = {one.name: one.value for one in result.trunnion.summary}
 
-    def most(part: str, key: str, own: Any) -> Any:
+    def most(part, key, own):
         """What the summary has, between positions and beside jumps too: no less than at positions but for rounding."""
         found = np.array(
             [told.get(f"{name}.{key}", value) for name, value in zip(result[part].values, own, strict=True)]
@@ -70,8 +62,8 @@ def expected(result: xr.Dataset) -> dict[str, Any]:
         ("inverted-slider-crank", "post", "1.02 * 1 m"),  # a range, driven by a slide
     ],
 )
-def test_a_point_equals_the_analysis_to_the_bit(model: str, name: str, text: str) -> None:
-    mechanism = read(model)
+def test_a_point_equals_the_analysis_to_the_bit(model, name, text):
+    mechanism = example(model)
     if model == "inverted-slider-crank":
         text = f"1.02 * ({mechanism.dimensions['post'].source})"
     one = trunnion.analyse(mechanism.with_values({name: text}), STEPS)
@@ -85,11 +77,11 @@ def test_a_point_equals_the_analysis_to_the_bit(model: str, name: str, text: str
         assert swept[f"drive_effort_{end}"].attrs["units"] == one["drive_effort"].attrs["units"]
 
 
-def test_two_names_are_a_grid() -> None:
+def test_two_names_are_a_grid():
     """Dimensions in the order of the names, last; every point is that of the two values."""
-    mechanism = read("durango-fourbar")
+    mechanism = example("durango-fourbar")
     lengths, coefficients = ["1.6 m", "2 m", "2.2 m"], [0.1, 0.3]
-    seen: list[int] = []
+    seen = []
     grid = trunnion.sweep(
         mechanism, {"AB": lengths, "B.friction.coefficient": coefficients}, STEPS, progress=seen.append, margin=True
     )
@@ -107,9 +99,9 @@ def test_two_names_are_a_grid() -> None:
 
 
 @pytest.mark.parametrize("steps", [9, 48])  # each point by itself, and in one pass
-def test_a_locking_margin_does_not_depend_on_steps(steps: int) -> None:
+def test_a_locking_margin_does_not_depend_on_steps(steps):
     """The least over the cycle, as `analyse` has it of a mechanism with the point's number."""
-    mechanism, arms = read("elliptic-trammel"), ["80 mm", "95 mm"]
+    mechanism, arms = example("elliptic-trammel"), ["80 mm", "95 mm"]
     swept = trunnion.sweep(mechanism, {"a": arms}, steps, margin=True)
     for arm, margin in zip(arms, swept["locking_margin"].values, strict=True):
         summary = trunnion.analyse(mechanism.with_values({"a": arm}), 360).trunnion.summary
@@ -117,7 +109,7 @@ def test_a_locking_margin_does_not_depend_on_steps(steps: int) -> None:
 
 
 # of every kind: dyads, class III, Newton in space, closed form in space; with points that lock or cannot be assembled
-TOGETHER: dict[str, Values] = {
+TOGETHER = {
     "durango-fourbar": {"AB": ["1.6 m", "2.6 m", "2.2 m"], "joint_defaults.friction.coefficient": [0.0, 0.3, 2.0]},
     "slider-crank": {"r": ["40 mm", "50 mm"], "O.speed": [50, 100], "P.friction.coefficient": [0, 0.1]},
     "jansen": {"dimensions.a": ["37 cm", "38 cm"]},
@@ -130,9 +122,9 @@ TOGETHER: dict[str, Values] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", TOGETHER)
-def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_points_solved_together_equal_points_solved_alone(model, monkeypatch):
     """Statuses exactly, figures but for the rounding of the friction iteration."""
-    mechanism, over = read(model), TOGETHER[model]
+    mechanism, over = example(model), TOGETHER[model]
     points = Points(mechanism, grid_of(mechanism, over), STEPS, FrictionMethod())
     assert points._similar
     assert any(found is not None for found in points._together(list(np.ndindex(points.shape))))
@@ -146,9 +138,9 @@ def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatc
         np.testing.assert_allclose(both[name].values, values.values, rtol=1e-9, atol=power, err_msg=str(name))
 
 
-def test_errors_of_points_solved_together() -> None:
+def test_errors_of_points_solved_together():
     """Errors without seats go through one pass as well: beside the ideal mechanism, point by point as `analyse`."""
-    data = read("slider-crank").data()
+    data = example("slider-crank").data()
     data["errors"] = {"r": "0.05 mm"}
     mechanism = Mechanism(**data)
     swept = trunnion.sweep(mechanism, {"r": ["40 mm", "50 mm"], "errors.dimensions.r": ["0 mm", "0.1 mm"]}, STEPS)
@@ -163,8 +155,8 @@ def test_errors_of_points_solved_together() -> None:
 
 
 # what cannot be answered, what cannot be asked
-def test_points_that_cannot_be_assembled_have_no_figures() -> None:
-    swept = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m", "2.2 m"]}, 72, margin=True)
+def test_points_that_cannot_be_assembled_have_no_figures():
+    swept = trunnion.sweep(example("durango-fourbar"), {"AB": ["2.1 m", "2.6 m", "2.2 m"]}, 72, margin=True)
     assert swept["status"].values.tolist()[1] == Status.NOT_ASSEMBLED
     assert int(swept["without_answer"][1]) == 5
     assert np.isfinite(swept["drive_effort_max"].values[0]).tolist() == [True, False, True]
@@ -175,7 +167,7 @@ def test_points_that_cannot_be_assembled_have_no_figures() -> None:
     assert "AB = 2.6 m (5 positions" in said[0]["what"]
 
 
-BAD: dict[str, tuple[dict[str, Any], str]] = {
+BAD = {
     "nothing": ({}, "0 names"), "seven names": ({f"n{i}": [1] for i in range(7)}, "7 names"),
     "unknown name": ({"AX": [1, 2]}, "known: 'AB', 'BC'"),
     "several numbers": ({"coefficient": [0.1, 0.2]}, "say which"),
@@ -191,14 +183,14 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_swept_is_said(case: str) -> None:
+def test_what_cannot_be_swept_is_said(case):
     over, word = BAD[case]
     with pytest.raises(MechanismError) as caught:
-        trunnion.sweep(read("durango-fourbar"), over, 4)
+        trunnion.sweep(example("durango-fourbar"), over, 4)
     assert word in str(caught.value)
 
 
-def test_what_is_wrong_at_a_point_says_at_which() -> None:
+def test_what_is_wrong_at_a_point_says_at_which():
     """Two values that are sound each by itself and impossible together."""
     inertia = {"cross.inertia.xx": [6.0e-6, 4.5e-6], "cross.inertia.zz": [2.0e-6, 5.0e-6]}
     mechanism = trunnion.read(CARDAN).with_friction("off")
@@ -206,18 +198,18 @@ def test_what_is_wrong_at_a_point_says_at_which() -> None:
         trunnion.sweep(mechanism, inertia, 4)
 
 
-def model(name: str, measures: dict[str, object]) -> Mechanism:
-    data = trunnion.read(EXAMPLES / f"{name}.yaml").data()
+def model(name, measures):
+    data = example(name).data()
     return Mechanism(**{**data, "measures": {**data.get("measures", {}), **measures}})
 
 
-def test_a_point_without_an_answer_has_no_figure() -> None:
+def test_a_point_without_an_answer_has_no_figure():
     mechanism = model("durango-fourbar", {"torque": {"effort": "A", "as": "rms"}})
     result = trunnion.sweep(mechanism, {"AB": ["2 m", "9 m"]}, 24, measures=["torque"])
     assert np.isfinite(result["torque"].values).tolist() == [True, False]
 
 
-def test_what_cannot_be_swept_says_why() -> None:
+def test_what_cannot_be_swept_says_why():
     mechanism = model("durango-fourbar", {
         "angle": {"rotation": "D"}, "error": {"transmission_error": "D"}, "status": {"stroke": "D"},
     })  # fmt: skip
@@ -230,8 +222,8 @@ def test_what_cannot_be_swept_says_why() -> None:
     assert "name of a figure of the sweep" in texts[2]
 
 
-def test_plain_numbers_are_si() -> None:
-    mechanism = read("slider-crank")
+def test_plain_numbers_are_si():
+    mechanism = example("slider-crank")
     swept = trunnion.sweep(mechanism, {"O.speed": (50, 100, 3)}, 4)
     assert swept["O.speed"].values.tolist() == [50.0, 75.0, 100.0]
     assert swept["O.speed"].attrs["units"] == "rad/s"
@@ -240,9 +232,9 @@ def test_plain_numbers_are_si() -> None:
     assert trunnion.sweep(mechanism, {"r": [0.05]}, 4)["r"].attrs["units"] == "m"
 
 
-def test_a_table_that_closes_at_some_points_alone() -> None:
+def test_a_table_that_closes_at_some_points_alone():
     """Its first point comes again where the period is longer than the points."""
-    data = read("durango-fourbar").data()
+    data = example("durango-fourbar").data()
     points = [["0 s", "150 N m"], ["0.3 s", "200 N m"], ["0.6 s", "150 N m"]]
     data["tables"] = {"f": {"over": "time", "points": points, "period": "0.6 s"}}
     data["loads"]["brake"] = {"link": "rocker", "moment": "-f"}

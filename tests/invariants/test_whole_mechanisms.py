@@ -1,13 +1,12 @@
 """What must hold for any mechanism: balance of power, change of frame, mirror, units, order of links, batches."""
 
 import functools
-from typing import Any
 
 import numpy as np
 import pytest
 
 from brief import brief
-from mechanisms import MODELS, Data, build, in_units, law_named, model, transformed
+from mechanisms import MODELS, build, in_units, law_named, model, transformed
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.joints.friction import FRICTION_LAWS
 
@@ -19,7 +18,7 @@ UNITS = {"micrometres": (1e-6, 1e-12, 1e-3), "megametres": (1e6, 1e9, 1e2), "oth
 ODD = ["link_angle_velocity", "link_angle_acceleration", "joint_rotation_velocity", "friction_torque"]
 
 
-def same(a: Any, b: Any, name: str, tolerance: float = 1e-10) -> None:
+def same(a, b, name, tolerance=1e-10):
     """Equal within a share of the largest value, NaN in the same places."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     scale = float(np.nanmax(np.abs(b), initial=0.0)) or 1.0
@@ -27,14 +26,14 @@ def same(a: Any, b: Any, name: str, tolerance: float = 1e-10) -> None:
 
 
 @functools.cache
-def unchanged(name: str) -> Any:
+def unchanged(name):
     """The result that those of the changed models are compared with, made once."""
     return brief(Mechanism(**model(MODELS[name]())), STEPS)
 
 
-def as_seen(data: Data, kind: str) -> tuple[Data, dict[str, Any]]:
+def as_seen(data, kind):
     """The same machine told otherwise, and by what its numbers are multiplied: vectors by a matrix."""
-    units: dict[str, Any] = dict.fromkeys((*EVEN, *ODD, "reaction_moment"), 1.0)
+    units = dict.fromkeys((*EVEN, *ODD, "reaction_moment"), 1.0)
     if kind in SHIFTS:
         c, s = np.cos(0.83), np.sin(0.83)
         vectors = dict.fromkeys(VECTORS, np.array([[c, -s], [s, c]]))
@@ -56,7 +55,7 @@ def as_seen(data: Data, kind: str) -> tuple[Data, dict[str, Any]]:
 @pytest.mark.sample(12)
 @pytest.mark.parametrize("kind", [*SHIFTS, "mirrored", *UNITS])
 @pytest.mark.parametrize("name", MODELS)
-def test_a_machine_told_otherwise_is_the_same(name: str, kind: str) -> None:
+def test_a_machine_told_otherwise_is_the_same(name, kind):
     """1e4 m away four digits fewer are left of the position; micrometres change numbers by their units alone."""
     data = model(MODELS[name]())
     told, units = as_seen(data, kind)
@@ -81,7 +80,7 @@ def test_a_machine_told_otherwise_is_the_same(name: str, kind: str) -> None:
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("law", [law for law in FRICTION_LAWS if law != "rolling"])  # which is of pins alone
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III"])
-def test_every_law_in_a_mechanism(name: str, law: str) -> None:
+def test_every_law_in_a_mechanism(name, law):
     """Friction is what the law says of load and slip, it only takes power, and both methods find it."""
     friction, radius = law_named(law), 0.02
     parameters = {key: value for key, value in friction.items() if key != "law"}

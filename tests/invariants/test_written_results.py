@@ -5,8 +5,6 @@ import json
 import stat
 import sys
 from importlib.util import find_spec
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +12,7 @@ import xarray as xr
 
 import trunnion
 from mechanisms import DURANGO, MODELS, analyse, four_bar
+from mechanisms_parts import EXAMPLES
 from trunnion import MechanismError
 from trunnion.results import variables as results
 from trunnion.results.save import FORMATS
@@ -22,23 +21,23 @@ export = sys.modules["trunnion.results.save"]
 
 
 @pytest.fixture(scope="module")
-def result() -> Any:
+def result():
     return trunnion.analyse(trunnion.read(DURANGO), 20)
 
 
 @pytest.fixture(scope="module")
-def gap() -> Any:
+def gap():
     return analyse(four_bar(0.8, 0.65, 0.5, 1.0), 24)
 
 
-def table(path: Path) -> tuple[list[str], list[list[str]]]:
+def table(path):
     with path.open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
     return header, rows
 
 
 @pytest.mark.parametrize("units_row", [False, True])
-def test_csv_holds_every_bit(result: Any, tmp_path: Path, units_row: bool) -> None:
+def test_csv_holds_every_bit(result, tmp_path, units_row):
     trunnion.save(result, tmp_path / "r.csv", units_row=units_row)
     header, rows = table(tmp_path / "r.csv")
     if units_row:
@@ -63,7 +62,7 @@ def test_csv_holds_every_bit(result: Any, tmp_path: Path, units_row: bool) -> No
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("suffix", [".nc", ".zarr"])
-def test_reopened_is_the_same_dataset(result: Any, gap: Any, tmp_path: Path, suffix: str) -> None:
+def test_reopened_is_the_same_dataset(result, gap, tmp_path, suffix):
     if suffix == ".zarr" and not find_spec("zarr"):
         with pytest.raises(MechanismError):
             trunnion.save(result, tmp_path / "r.zarr")
@@ -84,7 +83,7 @@ def test_reopened_is_the_same_dataset(result: Any, gap: Any, tmp_path: Path, suf
             assert json.loads(again.attrs["findings"]) == json.loads(one.attrs["findings"])
 
 
-def test_json_is_strict_json(gap: Any, tmp_path: Path) -> None:
+def test_json_is_strict_json(gap, tmp_path):
     """No NaN or Infinity, which JSON does not have; null in their place; numbers to the last bit."""
     gap = gap.copy(deep=True)
     gap["reaction_force"].values[0, 0, 0] = np.inf
@@ -98,15 +97,13 @@ def test_json_is_strict_json(gap: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_failing_writer_leaves_nothing(
-    result: Any, tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failing_writer_leaves_nothing(result, tmp_path, suffix, monkeypatch):
     """Whatever was there stays; no half file, no temporary file."""
     path = tmp_path / f"r{suffix}"
     if suffix != ".zarr":
         path.write_text("before")
 
-    def breaks(result: Any, path: Path, units_row: bool, columns: Any) -> None:
+    def breaks(result, path, units_row, columns):
         if path.exists():
             path.write_text("half")
         raise OSError(28, "No space left on device")
@@ -123,14 +120,14 @@ def test_a_failing_writer_leaves_nothing(
 
 
 @pytest.mark.parametrize("name", ["r.xls", "r", "r.csv.gz", ".csv"])
-def test_unknown_extension(result: Any, tmp_path: Path, name: str) -> None:
+def test_unknown_extension(result, tmp_path, name):
     with pytest.raises(MechanismError) as error:
         trunnion.save(result, tmp_path / name)
     assert ".csv" in str(error.value)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_is_no_file(result: Any, tmp_path: Path) -> None:
+def test_a_folder_is_no_file(result, tmp_path):
     (tmp_path / "r.csv").mkdir()
     with pytest.raises(MechanismError):
         trunnion.save(result, tmp_path / "r.csv")
@@ -140,7 +137,7 @@ def test_a_folder_is_no_file(result: Any, tmp_path: Path) -> None:
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("mode", [0o600, 0o664, 0o444])
 @pytest.mark.parametrize("name", ["r.csv", "r.nc", "r.json"])
-def test_a_file_that_is_replaced_hands_on_its_permissions(result: Any, tmp_path: Path, name: str, mode: int) -> None:
+def test_a_file_that_is_replaced_hands_on_its_permissions(result, tmp_path, name, mode):
     (tmp_path / name).write_text("before", "utf-8")
     (tmp_path / name).chmod(mode)
     (tmp_path / f"link-{name}").symlink_to(name)
@@ -150,7 +147,7 @@ def test_a_file_that_is_replaced_hands_on_its_permissions(result: Any, tmp_path:
         assert (tmp_path / name).stat().st_size > 1000
 
 
-def test_tables_in_the_units_of_the_model(tmp_path: Path) -> None:
+def test_tables_in_the_units_of_the_model(tmp_path):
     """Each column bears its unit, and its numbers are those in SI by the factor that it stands for."""
     import pandas as pd
 
@@ -173,7 +170,6 @@ def test_tables_in_the_units_of_the_model(tmp_path: Path) -> None:
         trunnion.save(result, tmp_path / "no.csv", units="imperial")
 
 
-EXAMPLES = DURANGO.parent
 STEPS = 60
 ASKED = [["reaction_force"], ["joint_rotation", "point_position"], ["locking_margin"], ["drive_effort_lower"], []]
 
@@ -183,7 +179,7 @@ ASKED = [["reaction_force"], ["joint_rotation", "point_position"], ["locking_mar
     ("example", "engine"),
     [("durango-fourbar", "compiled"), ("drawing-press", "numpy"), ("rssr", "numpy"), ("fourbar-by-grades", "compiled")],
 )
-def test_what_is_kept_is_what_the_whole_result_has(example: str, engine: str) -> None:
+def test_what_is_kept_is_what_the_whole_result_has(example, engine):
     mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
     all_ = trunnion.analyse(mechanism, STEPS, engine=engine)
     for names in ASKED:
@@ -209,7 +205,7 @@ def test_what_is_kept_is_what_the_whole_result_has(example: str, engine: str) ->
         assert [one.what for one in some.trunnion.findings] == [one.what for one in all_.trunnion.findings]
 
 
-def test_numbers_of_half_the_size() -> None:
+def test_numbers_of_half_the_size():
     mechanism = trunnion.read(DURANGO)
     double, single = (trunnion.analyse(mechanism, STEPS, dtype=dtype) for dtype in ("float64", "float32"))
     assert single.attrs == double.attrs
@@ -222,15 +218,15 @@ def test_numbers_of_half_the_size() -> None:
 @pytest.mark.parametrize(
     ("asked", "where"), [({"variables": ["reaction_forces"]}, "variables"), ({"dtype": "float16"}, "dtype")]
 )
-def test_what_there_is_not_is_said(asked: dict[str, object], where: str) -> None:
+def test_what_there_is_not_is_said(asked, where):
     with pytest.raises(MechanismError) as caught:
-        trunnion.analyse(trunnion.read(DURANGO), STEPS, **asked)  # type: ignore[arg-type]
+        trunnion.analyse(trunnion.read(DURANGO), STEPS, **asked)
     assert caught.value.findings[0].where == where
     if where == "variables":
         assert "reaction_force" in caught.value.findings[0].remedy
 
 
-def test_csv_columns_of_a_slide(tmp_path: Path) -> None:
+def test_csv_columns_of_a_slide(tmp_path):
     trunnion.save(analyse(MODELS["slider-crank"](), 15), tmp_path / "r.csv")
     header, _ = table(tmp_path / "r.csv")
     assert {"C.slide", "C.slide_velocity", "C.reaction_moment", "C.friction_force", "C.friction_power"} <= set(header)
@@ -238,7 +234,7 @@ def test_csv_columns_of_a_slide(tmp_path: Path) -> None:
     assert "A.slide" not in header
 
 
-def test_no_two_variables_of_a_result_share_their_numbers() -> None:
+def test_no_two_variables_of_a_result_share_their_numbers():
     """Who changes one of them in place changes that alone."""
     result = analyse(four_bar(0.8, 0.65, 0.5, 1.0), 6)
     shared = [

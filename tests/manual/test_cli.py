@@ -4,18 +4,15 @@ import csv
 import json
 import subprocess
 import sys
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
-from manual.conftest import Run
+from mechanisms_parts import EXAMPLES
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 
 
-def model(tmp_path: Path, change: Callable[[str], str], name: str = "model.yaml") -> Path:
+def model(tmp_path, change, name="model.yaml"):
     """The four-bar with its text changed."""
     text = FOUR_BAR.read_text("utf-8")
     changed = change(text)
@@ -25,18 +22,18 @@ def model(tmp_path: Path, change: Callable[[str], str], name: str = "model.yaml"
     return path
 
 
-def table(path: Path) -> list[dict[str, str]]:
+def table(path):
     """Rows of a CSV file."""
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 
-def files(folder: Path) -> set[str]:
+def files(folder):
     return {path.name for path in folder.iterdir()}
 
 
 @pytest.mark.slow
-def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(program: Run, tmp_path: Path) -> None:
+def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(program, tmp_path):
     done = program("analyse", FOUR_BAR, "--out", "r.csv", "--out", "r.nc", "--out", "r.json", "--report", "r.html")
     assert done.code == 0
     for figure in ("−18.5698 │ kN m", "9.28831 │ kN m", "517.466", "2.37558", "I(0,1)R → II(2,3)RRR"):
@@ -50,7 +47,7 @@ def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(pr
     assert json.loads((tmp_path / "r.json").read_text("utf-8"))["attrs"]["formula"] == "I(0,1)R → II(2,3)RRR"
 
 
-def test_set_replaces_dimensions_and_paths(program: Run) -> None:
+def test_set_replaces_dimensions_and_paths(program):
     plain = program("analyse", FOUR_BAR).out
     longer = program("analyse", FOUR_BAR, "--set", "AB=2.1m").out
     assert longer != plain
@@ -59,7 +56,7 @@ def test_set_replaces_dimensions_and_paths(program: Run) -> None:
 
 
 @pytest.mark.slow
-def test_points_come_from_a_csv_file(program: Run, tmp_path: Path) -> None:
+def test_points_come_from_a_csv_file(program, tmp_path):
     """Every verb that reads a model takes them; what is wrong with the file has its line."""
     (tmp_path / "motion.csv").write_text("time [s];angle [deg]\n0;0\n0,5;60\n1;90\n", encoding="utf-8")
     option = ("--table", "A=motion.csv")
@@ -77,7 +74,7 @@ def test_points_come_from_a_csv_file(program: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_check_lists_the_ways_and_draws_them(program: Run, tmp_path: Path) -> None:
+def test_check_lists_the_ways_and_draws_them(program, tmp_path):
     done = program("check", FOUR_BAR, "--assemblies", "ways.svg")
     assert done.code == 0
     shown = [line.strip() for line in done.out.splitlines()]
@@ -99,9 +96,7 @@ def test_check_lists_the_ways_and_draws_them(program: Run, tmp_path: Path) -> No
         ("coupler: way-x", "'way-x' is not the name of an assembly mode"),
     ],
 )
-def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
-    program: Run, tmp_path: Path, verb: str, hint: str, told: str
-) -> None:
+def test_a_wrong_name_of_an_assembly_is_found_in_its_line(program, tmp_path, verb, hint, told):
     path = model(tmp_path, lambda text: text.replace("C: [7.6, 2.1]", hint))
     line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if hint in one)
     done = program(verb, path, *(["--out", "r.html"] if verb == "report" else []))
@@ -111,7 +106,7 @@ def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
     assert files(tmp_path) == {"model.yaml"}
 
 
-def test_examples_are_listed_and_copied(program: Run, tmp_path: Path) -> None:
+def test_examples_are_listed_and_copied(program, tmp_path):
     assert "durango-fourbar" in program("examples").out
     assert program("examples", "durango-fourbar").code == 0
     assert (tmp_path / "durango-fourbar.yaml").read_bytes() == FOUR_BAR.read_bytes()
@@ -122,14 +117,14 @@ def test_examples_are_listed_and_copied(program: Run, tmp_path: Path) -> None:
     assert "durango-fourbar" in program("examples", "nothing-like-it").err
 
 
-def test_schema_is_shown_and_written(program: Run, tmp_path: Path) -> None:
+def test_schema_is_shown_and_written(program, tmp_path):
     shown = json.loads(program("schema").out)
     assert "links" in shown["properties"]
     assert program("schema", "--out", "s.json").code == 0
     assert json.loads((tmp_path / "s.json").read_text("utf-8")) == shown
 
 
-def test_units_row_comes_only_on_request(program: Run, tmp_path: Path) -> None:
+def test_units_row_comes_only_on_request(program, tmp_path):
     for options in ((), ("--units-row",)):
         program("analyse", FOUR_BAR, "--steps", "4", "--out", "r.csv", *options)
         head, *rows = (tmp_path / "r.csv").read_text("utf-8").splitlines()
@@ -138,7 +133,7 @@ def test_units_row_comes_only_on_request(program: Run, tmp_path: Path) -> None:
         assert (rows[0].split(",")[:3] == ["s", "rad", "rad/s"]) == bool(options)
 
 
-def test_a_linkage_that_does_not_close_everywhere_says_where_and_by_how_much(program: Run, tmp_path: Path) -> None:
+def test_a_linkage_that_does_not_close_everywhere_says_where_and_by_how_much(program, tmp_path):
     done = program("analyse", FOUR_BAR, "--set", "AB=4m", "--out", "r.csv")
     assert done.code == 1
     assert "cannot be assembled" in done.err
@@ -155,21 +150,14 @@ def test_a_linkage_that_does_not_close_everywhere_says_where_and_by_how_much(pro
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (["--steps", "0"], "steps"),
-        (["--set", "AX=1"], "AB"),
-        (["--set", "AB=2 kg"], "mass"),
-        (["--set", "AB=-1 m;import os"], "AB"),
-        (["--friction", "kulomb"], "coulomb"),
-        (["--method", "magic"], "newton"),
-        (["--criterion", "-1"], "criterion"),
-        (["--out", "r.ods"], ".csv"),
-        (["--units-row"], "--units-row: has no effect"),
-        (["--units", "model"], "--units: has no effect"),
-        (["--columns", "all"], "--columns: has no effect"),
-        (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
+        (["--steps", "0"], "steps"), (["--set", "AX=1"], "AB"), (["--set", "AB=2 kg"], "mass"),
+        (["--set", "AB=-1 m;import os"], "AB"), (["--friction", "kulomb"], "coulomb"),
+        (["--method", "magic"], "newton"), (["--criterion", "-1"], "criterion"), (["--out", "r.ods"], ".csv"),
+        (["--units-row"], "--units-row: has no effect"), (["--units", "model"], "--units: has no effect"),
+        (["--columns", "all"], "--columns: has no effect"), (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
     ],
-)
-def test_bad_options_are_refused_with_a_message(program: Run, tmp_path: Path, options: list[str], word: str) -> None:
+)  # fmt: skip
+def test_bad_options_are_refused_with_a_message(program, tmp_path, options, word):
     done = program("analyse", FOUR_BAR, *options)
     assert done.code == 2
     assert word in done.err
@@ -177,7 +165,7 @@ def test_bad_options_are_refused_with_a_message(program: Run, tmp_path: Path, op
 
 
 @pytest.mark.parametrize(("words", "status"), [(["check", str(FOUR_BAR)], 0), (["analyse", "missing.yaml"], 2)])
-def test_the_process_ends_at_once_but_with_all_that_is_due(words: list[str], status: int) -> None:
+def test_the_process_ends_at_once_but_with_all_that_is_due(words, status):
     """What was printed is written, what was to be done at the end is done; modules are not taken down one by one."""
     begin = """
 import atexit, sys
@@ -197,7 +185,7 @@ main()
     assert bool(done.stderr) == bool(status)
 
 
-def test_help_needs_no_heavy_imports() -> None:
+def test_help_needs_no_heavy_imports():
     """What keeps `trunnion --help` quick."""
     heavy = ("numpy", "xarray", "pint", "matplotlib")
     code = f"import sys, trunnion.cli.app; print([m for m in {heavy} if m in sys.modules])"

@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,9 +10,8 @@ import pytest
 import xarray as xr
 
 import trunnion
-from manual.conftest import Run
+from mechanisms_parts import EXAMPLES
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOURBAR, GRADES, PISTON = (
     EXAMPLES / f"{name}.yaml" for name in ("toleranced-fourbar", "fourbar-by-grades", "piston-by-cost")
 )
@@ -21,7 +19,7 @@ QUICK = ("--steps", 24, "--samples", 100)
 
 
 @pytest.mark.slow
-def test_tables_and_files(program: Run, tmp_path: Path) -> None:
+def test_tables_and_files(program, tmp_path):
     files = ["a.csv", "a.measures.csv", "a.offers.csv", "a.json", "a.nc", "a.parquet", "a.svg", "a.png"]
     asked = ("--steps", 72, "--samples", 100, "--curve", 3, "--report", "a.html")
     code, out, err = program("allocate", FOURBAR, *asked, *(f"--out={name}" for name in files))
@@ -49,7 +47,7 @@ def test_tables_and_files(program: Run, tmp_path: Path) -> None:
     assert "Cost over accuracy" in page
 
 
-def test_the_model_is_written_with_its_comments(program: Run, tmp_path: Path) -> None:
+def test_the_model_is_written_with_its_comments(program, tmp_path):
     code, out, _ = program("allocate", GRADES, *QUICK, "--write", "bought.yaml", "--set", "rocker.mass=0.35kg")
     assert code == 0
     assert "wrote bought.yaml" in out
@@ -76,7 +74,7 @@ def test_the_model_is_written_with_its_comments(program: Run, tmp_path: Path) ->
         (["--samples", -1], "-1 samples"),
     ],
 )
-def test_faults(program: Run, options: list[object], text: str, tmp_path: Path) -> None:
+def test_faults(program, options, text, tmp_path):
     code, _, err = program("allocate", FOURBAR, *QUICK, *options)
     assert code == 2
     assert text in err
@@ -115,7 +113,7 @@ costs:
 """
 
 
-def test_limits_are_written_under_tolerances(program: Run, tmp_path: Path) -> None:
+def test_limits_are_written_under_tolerances(program, tmp_path):
     """Nothing but the limits is changed, rounded down to five digits: the model that is written keeps its limits."""
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, "--write", "b.yaml")
@@ -143,7 +141,7 @@ def test_limits_are_written_under_tolerances(program: Run, tmp_path: Path) -> No
     assert float(worst.max()) <= np.radians(0.2)
 
 
-def test_no_model_of_limits_that_are_not_kept(program: Run, tmp_path: Path) -> None:
+def test_no_model_of_limits_that_are_not_kept(program, tmp_path):
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     narrow = ("--set", "measures.angle.limit=±0.01 deg", "--set", "measures.place.limit=±0.001 mm")
     code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, *narrow, "--write", "b.yaml")

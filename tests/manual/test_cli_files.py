@@ -15,7 +15,6 @@ from unittest.mock import Mock
 import pytest
 import typer
 
-from manual.conftest import Run
 from manual.test_cli import EXAMPLES, FOUR_BAR
 from trunnion import read
 from trunnion.cli import app as cli
@@ -24,9 +23,7 @@ from trunnion.cycle import analyse as analysing
 
 
 @pytest.mark.parametrize("fault", [KeyError("x\ny"), RecursionError("too deep"), AssertionError(), MemoryError()])
-def test_an_unforeseen_exception_is_one_line(
-    program: Run, monkeypatch: pytest.MonkeyPatch, fault: BaseException
-) -> None:
+def test_an_unforeseen_exception_is_one_line(program, monkeypatch, fault):
     monkeypatch.setattr(analysing, "analysed", Mock(side_effect=fault))
     done = program("analyse", FOUR_BAR)
     assert done.code == 3
@@ -38,10 +35,8 @@ def test_an_unforeseen_exception_is_one_line(
 
 
 @pytest.mark.parametrize("words", [["--debug", "analyse"], ["analyse", "--debug"]])
-def test_debug_shows_where(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
-) -> None:
-    def broken(*_: object, **__: object) -> None:
+def test_debug_shows_where(monkeypatch, capsys, words):
+    def broken(*_, **__):
         raise KeyError("x")
 
     monkeypatch.setattr(analysing, "analysed", broken)
@@ -69,7 +64,7 @@ PARTS = ["--steps", "100000"]  # so many positions are written some at a time
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_full_disk_is_a_finding(out: str, words: list[str], tmp_path: Path) -> None:
+def test_a_full_disk_is_a_finding(out, words, tmp_path):
     """A limit of 5 kB a file stands for it: the process is not taken along, and nothing is left behind."""
     verb, *options = words
     done = subprocess.run(
@@ -86,7 +81,7 @@ def test_a_full_disk_is_a_finding(out: str, words: list[str], tmp_path: Path) ->
 @pytest.mark.spread(1, "zarr")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("end", ["csv", "nc", "parquet", "zarr", "xlsx"])
-def test_a_program_that_is_ended_leaves_no_draft(number: signal.Signals, end: str, tmp_path: Path) -> None:
+def test_a_program_that_is_ended_leaves_no_draft(number, end, tmp_path):
     """The old file stays, and no other; the exit status is that of the signal."""
     out = tmp_path / f"r.{end}"
     if end != "zarr":
@@ -108,14 +103,14 @@ def test_a_program_that_is_ended_leaves_no_draft(number: signal.Signals, end: st
 
 
 @pytest.mark.slow
-def test_workers_end_with_the_program(tmp_path: Path) -> None:
+def test_workers_end_with_the_program(tmp_path):
     words = ["tolerance", str(EXAMPLES / "toleranced-fourbar.yaml"), "--samples", "2000000", "--engine", "numpy"]
     with subprocess.Popen(
         [sys.executable, "-m", "trunnion", *words, "--jobs", "2", "--out", str(tmp_path / "t.csv")],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        workers: list[str] = []
+        workers = []
         while len(workers) < 2 and process.poll() is None:
             time.sleep(0.05)
             workers = children.read_text().split() if children.exists() else ["", ""]
@@ -136,7 +131,7 @@ def test_workers_end_with_the_program(tmp_path: Path) -> None:
         pytest.param(["sweep", "rssr.yaml", "--over", "a=20mm:30mm:1000", "--margin"], 3.0, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
-def test_ctrl_c_leaves_the_files_of_before(words: list[str], seconds: float, tmp_path: Path) -> None:
+def test_ctrl_c_leaves_the_files_of_before(words, seconds, tmp_path):
     """One rule for every verb: a part of a result replaces nothing, and the exit status is 130."""
     old = tmp_path / "r.csv"
     old.write_text("of before\n")
@@ -175,9 +170,7 @@ VERBS = {
         (("tolerance", "--kind", "pie"), "there is no figure 'pie'"),
     ],
 )
-def test_files_are_refused_before_anything_is_computed(
-    program: Run, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], text: str, tmp_path: Path
-) -> None:
+def test_files_are_refused_before_anything_is_computed(program, monkeypatch, words, text, tmp_path):
     monkeypatch.delattr(analysing, "analysed")
     verb, *options = words
     done = program(verb, TOLERANCED, *options)
@@ -186,7 +179,7 @@ def test_files_are_refused_before_anything_is_computed(
 
 
 @pytest.fixture
-def model(tmp_path: Path) -> Path:
+def model(tmp_path):
     """A model whose name ends as a result's may."""
     path = tmp_path / "a.json"
     read(TOLERANCED).write(path)
@@ -196,7 +189,7 @@ def model(tmp_path: Path) -> Path:
 @pytest.mark.spread(21)
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("way", ["same", "dots", "symlink", "hard link"])
-def test_model_is_not_written_over(program: Run, model: Path, verb: str, way: str) -> None:
+def test_model_is_not_written_over(program, model, verb, way):
     before = model.read_bytes()
     out = {"same": Path("a.json"), "dots": Path(".") / ".." / model.parent.name / "a.json"}.get(way, Path("b.json"))
     if way == "symlink":
@@ -210,7 +203,7 @@ def test_model_is_not_written_over(program: Run, model: Path, verb: str, way: st
     assert model.read_bytes() == before
 
 
-def test_report_and_figures_are_not_written_over_the_model(program: Run, model: Path) -> None:
+def test_report_and_figures_are_not_written_over_the_model(program, model):
     before = model.read_bytes()
     Path("r.html").symlink_to(model)
     Path("figures").mkdir()
@@ -222,7 +215,7 @@ def test_report_and_figures_are_not_written_over_the_model(program: Run, model: 
         assert model.read_bytes() == before
 
 
-def test_table_and_sample_are_not_written_over(program: Run, model: Path) -> None:
+def test_table_and_sample_are_not_written_over(program, model):
     points = Path("tab.csv")
     points.write_text("t [s],angle [deg]\n0,0\n0.5,90\n1,180\n")
     deviations = Path("dev.csv")
@@ -235,7 +228,7 @@ def test_table_and_sample_are_not_written_over(program: Run, model: Path) -> Non
         assert path.read_bytes() == before
 
 
-def test_two_outputs_are_two_files(program: Run, model: Path) -> None:
+def test_two_outputs_are_two_files(program, model):
     Path("link.csv").symlink_to("x.csv")
     for one, two in (("x.csv", "x.csv"), ("x.csv", "./x.csv"), ("x.csv", "link.csv")):
         done = program("analyse", model, "--steps", 4, "--out", one, "--out", two)
@@ -245,7 +238,7 @@ def test_two_outputs_are_two_files(program: Run, model: Path) -> None:
     assert (done.code, "--out" in done.err) == (2, True)
 
 
-def test_model_is_written_in_place_where_that_is_asked_for(program: Run, model: Path) -> None:
+def test_model_is_written_in_place_where_that_is_asked_for(program, model):
     done = program("allocate", model, "--samples", 100, "--steps", 72, "--write", model)
     assert (done.code, "--force" in done.err) == (2, True)
     before = model.read_bytes()
@@ -255,7 +248,7 @@ def test_model_is_written_in_place_where_that_is_asked_for(program: Run, model: 
     read(model)
 
 
-def test_a_link_stays_a_link(program: Run, model: Path) -> None:
+def test_a_link_stays_a_link(program, model):
     Path("real").mkdir()
     Path("out.csv").symlink_to("real/out.csv")
     for _ in range(2):  # there is nothing behind it at first
@@ -265,9 +258,9 @@ def test_a_link_stays_a_link(program: Run, model: Path) -> None:
     assert [one.name for one in Path("real").iterdir()] == ["out.csv"]
 
 
-def test_a_pipe_is_written_to(program: Run, model: Path) -> None:
+def test_a_pipe_is_written_to(program, model):
     os.mkfifo("pipe.json")
-    got: list[bytes] = []
+    got = []
     reader = threading.Thread(target=lambda: got.append(Path("pipe.json").read_bytes()))
     reader.start()
     assert program("analyse", model, "--steps", 4, "--out", "pipe.json").code == 0
@@ -276,12 +269,12 @@ def test_a_pipe_is_written_to(program: Run, model: Path) -> None:
     assert json.loads(got[0])["dims"]["position"] == 4
 
 
-def test_every_option_that_takes_a_path_is_an_output() -> None:
+def test_every_option_that_takes_a_path_is_an_output():
     """What a verb writes is known from its options alone; a verb that is registered otherwise is not guarded."""
     found = set()
     for command in cli.app.registered_commands:
         assert command.callback is not None
-        assert command.callback.__wrapped__  # type: ignore[attr-defined]
+        assert command.callback.__wrapped__
         found |= set(outputs(command.callback))
     assert found == {"assemblies", "checkpoint", "out", "report", "to", "write"}
     assert isinstance(cli.app, typer.Typer)

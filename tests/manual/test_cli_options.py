@@ -1,7 +1,6 @@
 """Options of several verbs: what they mean together; tables, notes and help of the terminal."""
 
 import json
-from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -10,7 +9,6 @@ from rich.cells import cell_len
 from typer.main import get_command
 
 import trunnion
-from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion.cli import app as cli
 from trunnion.cli.options import PLOT_KINDS, over, points
@@ -35,24 +33,24 @@ VERBS = [
 
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: str(verb[0]))
-def test_parameters_of_a_law_that_an_option_names(program: Run, verb: tuple[object, ...]) -> None:
+def test_parameters_of_a_law_that_an_option_names(program, verb):
     """Another law and its parameters by --set, in either order."""
     done = [program(verb[0], FOUR_BAR, *verb[1:], *options) for options in (LAW + SETTINGS, SETTINGS + LAW)]
     assert all(one.code in (0, 1) for one in done), done[0].err
     assert done[0] == done[1]
 
 
-def test_points_of_a_grid_are_all_combinations() -> None:
+def test_points_of_a_grid_are_all_combinations():
     assert points(over(["a=0deg:30deg:7", "b=1,2,3"])) == 21
     assert points({}) == 1
 
 
-def test_the_help_names_every_plot_of_a_cycle() -> None:
+def test_the_help_names_every_plot_of_a_cycle():
     """Written out there, for the module of the plots loads matplotlib."""
     assert PLOT_KINDS.replace(" or ", ", ").split(", ") == list(PLOTS)
 
 
-def test_one_position_instead_of_the_cycle(program: Run) -> None:
+def test_one_position_instead_of_the_cycle(program):
     """The numbers of `--at` are those of that row of the cycle, the summary of the cycle is the same."""
     mechanism = trunnion.read(FOUR_BAR)
     whole, there = trunnion.analyse(mechanism), trunnion.analyse(mechanism, at="60 deg")
@@ -68,7 +66,7 @@ def test_one_position_instead_of_the_cycle(program: Run) -> None:
 
 
 @pytest.mark.parametrize("words", [("--at", "20mm"), ("--steps", 0)])
-def test_what_is_wrong_with_an_option_is_said_of_the_option(program: Run, words: tuple[object, ...]) -> None:
+def test_what_is_wrong_with_an_option_is_said_of_the_option(program, words):
     done = program("analyse", FOUR_BAR, *words)
     assert (done.code, done.err.startswith(f"error: {words[0]}: ")) == (2, True), done.err
 
@@ -77,7 +75,7 @@ SLIDER, LOOSE = EXAMPLES / "toleranced-slider-crank.yaml", EXAMPLES / "fourbar-w
 
 
 @pytest.mark.slow
-def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
+def test_seats_of_all_joints_by_an_option(program, tmp_path):
     """--seat loaded gives seats, errors and what they cost; free is the mechanism with its pins in the middle."""
     done = program("analyse", SLIDER, "--seat", "loaded", "--out", tmp_path / "a.csv", "--out", tmp_path / "a.nc")
     assert done.code == 0
@@ -96,7 +94,7 @@ def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
     assert "are at the middle of their play" in free.err + free.out
 
 
-def test_the_list(program: Run) -> None:
+def test_the_list(program):
     code, out, _ = program("check", SLIDER, "--set", "crank=52mm", "--list")
     assert code == 0
     assert all(
@@ -117,9 +115,7 @@ ROWS = [
 
 
 @pytest.mark.parametrize("columns", [40, 80, 90, 200])
-def test_numbers_keep_their_units_and_words_are_whole(
-    columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_numbers_keep_their_units_and_words_are_whole(columns, monkeypatch, capsys):
     """A table too wide for whole words is shown in parts, each of which names its rows."""
     monkeypatch.setenv("COLUMNS", str(columns))
     show_rows("title", HEAD, ROWS)
@@ -131,7 +127,7 @@ def test_numbers_keep_their_units_and_words_are_whole(
 
 
 @pytest.mark.parametrize("code", sorted(QUIET))
-def test_what_nearly_every_run_has_is_a_note(code: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_nearly_every_run_has_is_a_note(code, capsys):
     """It is left to the report and to `check`; of the same code a warning is shown."""
     note = Finding("x", code=code, severity=Severity.NOTE)
     say([note])
@@ -141,8 +137,8 @@ def test_what_nearly_every_run_has_is_a_note(code: str, capsys: pytest.CaptureFi
     assert capsys.readouterr().err.count("x") == 2
 
 
-def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_read() -> None:
-    commands = get_command(cli.app).commands  # type: ignore[attr-defined]
+def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_read():
+    commands = get_command(cli.app).commands
     assert sorted(cli._name(verb) for verbs in cli.GROUPS.values() for verb in verbs) == sorted(commands)
     for name, command in commands.items():
         for example in cli.EXAMPLES[name]:
@@ -150,7 +146,7 @@ def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_rea
 
 
 @pytest.mark.slow
-def test_tolerances_are_written_as_asked(program: Run, tmp_path: Path) -> None:
+def test_tolerances_are_written_as_asked(program, tmp_path):
     """Tables, the whole result, a figure and a page of one run; with a row of units where that is asked for."""
     files = ["t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg"]
     asked = ("--steps", 12, "--samples", 200, "--kind", "histogram", "--units-row", "--report", "t.html")

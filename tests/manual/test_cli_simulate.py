@@ -1,19 +1,17 @@
 """`trunnion simulate` and `locking` as a user meets them: options, files, ranges, reports."""
 
 import json
-from pathlib import Path
 
 import pytest
 
-from manual.conftest import Run
+from mechanisms_parts import EXAMPLES
 from timed import PARALLELOGRAM, beside, driven_four_bar, swinging
 from trunnion import Mechanism
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PRESS = EXAMPLES / "flywheel-press.yaml"
 
 
-def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> None:
+def test_a_steady_cycle_is_written_as_a_cycle(program, tmp_path):
     files = ["--out", "c.csv", "--report", "c.html", "--out", "c.svg", "--kind", "speed"]
     assert program("simulate", PRESS, "--steady", "--steps", 36, *files).code == 0
     assert (tmp_path / "c.svg").stat().st_size > 5_000
@@ -22,7 +20,7 @@ def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_press_that_stalls_is_an_error(program: Run) -> None:
+def test_a_press_that_stalls_is_an_error(program):
     code, out, err = program("simulate", PRESS, "--set", "force=1000kN", "--set", "breakdown_effort=20Nm", "--time=2s")
     assert code == 1
     assert "error: driver O stalls at 1.129 s, at 235.6°, with the motor of O on: 87.69 N m act on it" in out + err
@@ -30,16 +28,14 @@ def test_a_press_that_stalls_is_an_error(program: Run) -> None:
 
 
 @pytest.mark.parametrize("name", ["b.spectrum.csv", "b.impacts.csv", "b.events.csv --steady", "b.png --kind orbit"])
-def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found(
-    program: Run, tmp_path: Path, name: str
-) -> None:
+def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found(program, tmp_path, name):
     code, _, err = program("simulate", PRESS, "--time=1h", "--out", *name.split())
     assert code == 2
     assert "there is no table" in err or "no joint of this motion is in play" in err
     assert not list(tmp_path.glob("b.*"))
 
 
-def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path) -> None:
+def test_the_command_line_tells_where_a_motion_ends(program, tmp_path):
     data = driven_four_bar("planar", *PARALLELOGRAM).data()
     folding = Mechanism(**data | {"assembly": data["assembly"] | {"rocker": "folds"}})
     for name, mechanism in {
@@ -65,7 +61,7 @@ def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path
 DRAWING, FREE = EXAMPLES / "drawing-press.yaml", EXAMPLES / "durango-fourbar.yaml"
 
 
-def test_without_friction_the_ranges_are_those_of_coefficients_of_zero(program: Run) -> None:
+def test_without_friction_the_ranges_are_those_of_coefficients_of_zero(program):
     off = program("locking", FREE, "--friction", "off", "--steps", 24).out.splitlines()
     zero = program("locking", FREE, "--set", "joint_defaults.friction=0", "--steps", 24).out.splitlines()
     start = next(k for k, line in enumerate(zero) if line.startswith("ranges of "))

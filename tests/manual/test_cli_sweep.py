@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 import xarray as xr
 
 import trunnion
-from manual.conftest import Run
 from manual.test_cli import EXAMPLES, FOUR_BAR, files
 from manual.test_cli import table as rows
 from played import four_bar
@@ -18,7 +16,7 @@ from trunnion.views.shown import plot as figure
 
 
 @pytest.mark.slow
-def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
+def test_table_csv_netcdf_and_figure(program, tmp_path):
     written = [f"--out=s{end}" for end in (".csv", ".nc", ".svg")]
     done = program("sweep", FOUR_BAR, "--over", "AB=1.6m:2.4m:3", "--steps", 36, *written)
     assert done.code == 0
@@ -41,7 +39,7 @@ def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
     assert ElementTree.parse(tmp_path / "s.svg").getroot().tag.endswith("svg")
 
 
-def test_options_of_the_model_come_first(program: Run, tmp_path: Path) -> None:
+def test_options_of_the_model_come_first(program, tmp_path):
     same = ("--over", "AB=2m,2.1m", "--steps", 12)
     program("sweep", FOUR_BAR, *same, "--friction", "off", "--set", "BC=6.2m", "--out", "s.csv")
     mechanism = trunnion.read(FOUR_BAR).with_values({"BC": "6.2 m"}).with_friction("off")
@@ -71,7 +69,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_sweeps_are_refused_with_a_message(program: Run, tmp_path: Path, case: str) -> None:
+def test_bad_sweeps_are_refused_with_a_message(program, tmp_path, case):
     options, word = BAD[case]
     done = program("sweep", FOUR_BAR, *options, "--out", "r.csv")
     assert done.code == 2
@@ -82,7 +80,7 @@ def test_bad_sweeps_are_refused_with_a_message(program: Run, tmp_path: Path, cas
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
 
 
-def test_a_limit_is_a_finding_with_the_line_of_the_file(program: Run, tmp_path: Path) -> None:
+def test_a_limit_is_a_finding_with_the_line_of_the_file(program, tmp_path):
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
     trunnion.Mechanism(**data).write(tmp_path / "bar.yaml")
     code, _, err = program("play", "bar.yaml", "--steps", 12, "--out", "bar.svg")
@@ -92,7 +90,7 @@ def test_a_limit_is_a_finding_with_the_line_of_the_file(program: Run, tmp_path: 
     assert (tmp_path / "bar.svg").exists()
 
 
-def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
+def test_the_figure_stacks_the_joints_up_to_the_sum():
     result = trunnion.play(trunnion.read(SLIDER), ["piston.Q.x"], steps=72)
     (axes,) = figure(result).axes
     total = next(line for line in axes.lines if line.get_label() == "sum: worst case, first order").get_xydata()
@@ -103,7 +101,7 @@ def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
 
 
 @pytest.fixture
-def model(tmp_path: Path) -> Path:
+def model(tmp_path):
     """The model of the page about the verb."""
     page = (EXAMPLES.parent / "docs" / "how-to" / "assemble.md").read_text("utf-8")
     found = re.search(r'```yaml title="leaning-four-bar.yaml"\n(.*?)```', page, re.DOTALL)
@@ -114,7 +112,7 @@ def model(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_too_little_clearance(program: Run, model: Path, tmp_path: Path) -> None:
+def test_too_little_clearance(program, model, tmp_path):
     written = [f"--out=f{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
     done = program("assemble", model, "--steps", 36, *written, "--units-row")
     assert done.code == 1
@@ -135,7 +133,7 @@ def test_too_little_clearance(program: Run, model: Path, tmp_path: Path) -> None
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_nothing_to_ask(program: Run, tmp_path: Path) -> None:
+def test_nothing_to_ask(program, tmp_path):
     done = program("assemble", EXAMPLES / "fourbar-in-space.yaml", "--steps", 12, "--out", "f.svg")
     assert done.code == 0
     assert "the loops close without any clearance" in done.err

@@ -1,21 +1,16 @@
 """What docs/conventions.md says of pins in their holes, on linkages whose numbers follow by hand."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
+from mechanisms_parts import example
 from trunnion.joints.clearance import describing
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RHO, RADIUS, LENGTH, WEIGHT = 2e-5, 5e-3, 0.02, 9.81  # m, m, m, N
-Data = dict[str, Any]
 
 
-def crank(*, turned_round: bool = False, pin: Data | None = None, **joint: Any) -> xr.Dataset:
+def crank(*, turned_round=False, pin=None, **joint):
     """A crank of 1 kg, balanced about its bearing A, that turns by 1 rad/s from 0; four positions, 90° apart.
 
     turned_round: the ground is the joint's second link. pin: other than with the clearance RHO.
@@ -36,7 +31,7 @@ def crank(*, turned_round: bool = False, pin: Data | None = None, **joint: Any) 
     )
 
 
-def rotor(*, centre: list[float] | None = None, pin: Data | None = None, **joint: Any) -> xr.Dataset:
+def rotor(*, centre=None, pin=None, **joint):
     """The same in space about z, weight along −x."""
     point = {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
     body = {"mass": 1.0, "centre": centre or [0, 0, 0], "inertia": {"xx": 1e-3, "yy": 1e-3, "zz": 1e-3}}
@@ -53,21 +48,21 @@ def rotor(*, centre: list[float] | None = None, pin: Data | None = None, **joint
     )
 
 
-def of(result: xr.Dataset, name: str, joint: str = "A") -> Any:
+def of(result, name, joint="A"):
     """A variable of a joint at the first position."""
     return result[name].sel(joint=joint).values[..., 0]
 
 
-def at(result: xr.Dataset, name: str, point: str = "crank.A", position: int = 0) -> Any:
+def at(result, name, point="crank.A", position=0):
     return result[name].sel(point=point).values[..., position]
 
 
-def near(found: Any, wanted: Any, share: float = 1e-6) -> None:
+def near(found, wanted, share=1e-6):
     """To a share of the clearance."""
     np.testing.assert_allclose(found, wanted, rtol=0, atol=share * RHO)
 
 
-def test_the_hole_is_on_the_second_link() -> None:
+def test_the_hole_is_on_the_second_link():
     """The pin's axis lies at ρ (cos ξ, sin ξ) in the axes of the hole's link: the crank is off by as much, turned."""
     seat = {"xi": float(np.radians(30))}
     c = RHO * np.array([np.cos(np.radians(30)), 0.5])
@@ -80,13 +75,13 @@ def test_the_hole_is_on_the_second_link() -> None:
         near(at(other, "point_error", position=position), c)  # the hole is in the ground
 
 
-def test_clearance_is_radial() -> None:
+def test_clearance_is_radial():
     ways = ({"clearance": RHO}, {"hole_radius": RADIUS + RHO}, {"clearance": RHO / 4, "cylindricity": 0.75 * RHO})
     for pin in ways:
         near(at(crank(pin=pin, seat={"xi": 0.0}), "point_error"), [-RHO, 0])
 
 
-def test_xi_in_the_pin() -> None:
+def test_xi_in_the_pin():
     """[P]'s ξ is counted in the pin: ξ + rotation, in (−π, π]."""
     result = crank(seat={"xi": 0.5})
     turns = np.arange(4) * np.pi / 2
@@ -96,7 +91,7 @@ def test_xi_in_the_pin() -> None:
     assert np.all((found > -np.pi) & (found <= np.pi))
 
 
-def test_a_load_presses_the_pin_its_own_way() -> None:
+def test_a_load_presses_the_pin_its_own_way():
     """The pin carries the crank's weight: it pushes the hole up, lies at its top, and the crank hangs lower by ρ."""
     result = crank(seat="loaded")
     near(of(result, "seat_offset")[0, :2], [0, RHO])
@@ -111,7 +106,7 @@ def test_a_load_presses_the_pin_its_own_way() -> None:
 
 @pytest.mark.parametrize("factor", [1.0, 4 / 3])
 @pytest.mark.parametrize("turned_round", [False, True])
-def test_friction_turns_the_seat(turned_round: bool, factor: float) -> None:
+def test_friction_turns_the_seat(turned_round, factor):
     """By atan μ, in the sense in which the second link turns against the first; the pair factor does not count."""
     result = crank(seat="loaded", turned_round=turned_round, friction={"coefficient": 0.3, "pair_factor": factor})
     sense, up = (-1, -1) if turned_round else (1, 1)
@@ -119,7 +114,7 @@ def test_friction_turns_the_seat(turned_round: bool, factor: float) -> None:
     near(of(result, "seat_offset")[0, :2], RHO * np.array([np.cos(angle), np.sin(angle)]))
 
 
-def test_end_1_is_the_lower_one() -> None:
+def test_end_1_is_the_lower_one():
     """ξ = 0, β = 180°: end 1 at ξ + β/2, on +y, at z = −H/2, end 2 on −y; the crank leans the other way."""
     result = rotor(seat={"beta": float(np.pi), "xi": 0.0})
     near(of(result, "seat_offset")[:, :2], [[0, RHO], [0, -RHO]])
@@ -130,14 +125,14 @@ def test_end_1_is_the_lower_one() -> None:
     near(of(result, "contact_position")[:, 2], [-deep, deep])
 
 
-def test_the_middle_of_the_bearing_is_where_the_pin_leans() -> None:
+def test_the_middle_of_the_bearing_is_where_the_pin_leans():
     """pin.offset along z: the crank turns about that point, so its own point A is off by lean times offset."""
     result = rotor(seat={"beta": float(np.pi), "xi": 0.0}, pin={"offset": 0.05})
     lean = np.arctan(2 * RHO / LENGTH)
     near(at(result, "point_error"), [0, -0.05 * np.sin(lean), 0.05 * (1 - np.cos(lean))])
 
 
-def test_beta_is_above_minus_pi_up_to_pi() -> None:
+def test_beta_is_above_minus_pi_up_to_pi():
     for angle in (0.0, 1.0, np.pi / 2, np.pi, -2.0):
         c = np.array([np.cos(angle), np.sin(angle)])
         assert float(describing((c[0], c[1]), (-c[0], -c[1]))[0]) == np.pi
@@ -146,7 +141,7 @@ def test_beta_is_above_minus_pi_up_to_pi() -> None:
     assert float(xi) == pytest.approx(-np.pi / 4)
 
 
-def test_the_farther_end_carries_less() -> None:
+def test_the_farther_end_carries_less():
     """A mass a above the middle of the bearing: the lever rule gives W (½ ∓ a/H) along x at end 1 and end 2."""
     aside = 0.004
     force = of(rotor(seat="loaded", centre=[0, 0, aside]), "end_force")
@@ -154,7 +149,7 @@ def test_the_farther_end_carries_less() -> None:
     np.testing.assert_allclose(force[:, 0], WEIGHT * np.array([0.5 - share, 0.5 + share]), atol=1e-4)
 
 
-def slider(seat: Data) -> xr.Dataset:
+def slider(seat):
     """A slider on a guide along x, pushed by hand."""
     axis = {"at": [0, 0], "axis": [1, 0]}
     return trunnion.analyse(
@@ -168,7 +163,7 @@ def slider(seat: Data) -> xr.Dataset:
     )  # fmt: skip
 
 
-def test_guide() -> None:
+def test_guide():
     """To either side, across; end 1 is the rear one; eᵢ = ρ cos(ξ ± β/2) along the normal, the slide turned by +90°."""
     result = slider({"xi": 0.0})
     near(of(result, "seat_offset", "S")[:, 1], [RHO, RHO])
@@ -179,9 +174,9 @@ def test_guide() -> None:
     assert turned == pytest.approx(-np.arctan(2 * RHO / LENGTH), rel=1e-9)
 
 
-def test_ball() -> None:
+def test_ball():
     """The ball is on the first link; the direction is that in its socket, in the element on the second."""
-    rssr = trunnion.read(EXAMPLES / "rssr-with-play.yaml")
+    rssr = example("rssr-with-play")
     values = {"joints.C.pin.clearance": RHO, "joints.C.seat": {"direction": [0, 0, 1]}}
     result = trunnion.analyse(rssr.with_values({"joints.D.seat": "free"} | values), steps=4)
     for position in range(4):
@@ -189,7 +184,7 @@ def test_ball() -> None:
         near(way, RHO * np.array([0, -np.sin(np.pi / 3), 0.5]))  # z of the rocker is its axis
 
 
-def test_misalignment() -> None:
+def test_misalignment():
     """The hole leans towards +x of the crank and is moved there: the crank leans and lies the other way."""
     tilt, offset = 1e-3, 3e-5
     result = rotor(misalignment={"tilt": tilt, "offset": offset}, pin={"offset": 0.05})

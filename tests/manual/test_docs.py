@@ -13,10 +13,8 @@ import re
 import shlex
 import shutil
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -44,30 +42,26 @@ class Block:
     skip: bool
 
 
-def blocks(page: Path) -> Iterator[Block]:
+def blocks(page):
     """The fenced blocks of a page, in order."""
     text = page.read_text("utf-8")
     for found in FENCE.finditer(text):
         mark = MARK.search(text[: found.start()])
         title = re.search(r'title="([^"]+)"', found[3])
         yield Block(
-            found[2] or "",
-            title[1] if title else "",
-            found[4],
-            text.count("\n", 0, found.start()) + 1,
-            int(mark[2]) if mark and mark[1] == "exit" else 0,
-            bool(mark and mark[1] == "test"),
-        )
+            found[2] or "", title[1] if title else "", found[4], text.count("\n", 0, found.start()) + 1,
+            int(mark[2]) if mark and mark[1] == "exit" else 0, bool(mark and mark[1] == "test"),
+        )  # fmt: skip
 
 
 @pytest.fixture(scope="session")
-def files() -> dict[str, str]:
+def files():
     """Titled blocks of all pages: models that commands and Python code may use on any page."""
     return {block.title: block.text for page in PAGES for block in blocks(page) if block.title}
 
 
 @pytest.fixture
-def place(tmp_path: Path, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
+def place(tmp_path, files, monkeypatch):
     """The folder a page is worked through in, with the examples and the titled blocks."""
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     for name, text in files.items():
@@ -85,7 +79,7 @@ QUICK = ("CONTRIBUTING.md", "groups-by-hand.md", "dual-algebra.md")
     [pytest.param(page, marks=() if page.name in QUICK else pytest.mark.slow) for page in PAGES],
     ids=lambda page: str(page.relative_to(ROOT)),
 )
-def test_page(page: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_page(page, place, monkeypatch):
     for block, shown, statuses in worked_through(page, monkeypatch):
         where = f"{page.relative_to(ROOT)}:{block.line}"
         if block.language == "sh":  # only the last may end with the status that the block declares
@@ -96,12 +90,12 @@ def test_page(page: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             compare(block.text, shown, where)
 
 
-def worked_through(page: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Block, str, list[int]]]:
+def worked_through(page, monkeypatch):
     """The blocks of a page in order, with what the code or the commands printed last, and exit statuses of commands."""
-    names: dict[str, Any] = {"__name__": "page"}
+    names = {"__name__": "page"}
     shown = ""
     for block in (block for block in blocks(page) if not block.skip):
-        statuses: list[int] = []
+        statuses = []
         if block.language == "python":
             output = io.StringIO()
             with contextlib.redirect_stdout(output):
@@ -114,7 +108,7 @@ def worked_through(page: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tupl
         yield block, shown, statuses
 
 
-def run(command: str, monkeypatch: pytest.MonkeyPatch) -> tuple[int, str]:
+def run(command, monkeypatch):
     """Exit status and text of a command, run in this process as the console script would."""
     monkeypatch.setattr(sys, "argv", shlex.split(command, comments=True))
     output, status = io.StringIO(), 0
@@ -126,7 +120,7 @@ def run(command: str, monkeypatch: pytest.MonkeyPatch) -> tuple[int, str]:
     return status, output.getvalue()
 
 
-def compare(expected: str, actual: str, where: str) -> None:
+def compare(expected, actual, where):
     """Every line shown occurs in the output, in order; `…` stands for lines left out, rules of tables do not count."""
     lines = iter([_words(line) for line in actual.splitlines()])
     for line in (one for one in expected.splitlines() if one.strip() and one.strip() != "…"):
@@ -135,16 +129,16 @@ def compare(expected: str, actual: str, where: str) -> None:
         assert any(_alike(_words(line), other) for other in lines), f"{where}: not in the output: {line}\n{actual}"
 
 
-def _words(line: str) -> list[str]:
+def _words(line):
     return re.sub("[┃│━╇─┼]", " ", line).split()
 
 
-def _alike(expected: list[str], actual: list[str]) -> bool:
+def _alike(expected, actual):
     """Word for word; numbers to four digits, rounding noise as equal."""
     return len(expected) == len(actual) and all(_same(a, b) for a, b in zip(expected, actual, strict=True))
 
 
-def _same(a: str, b: str) -> bool:
+def _same(a, b):
     if a == b:
         return True
     values = [[float(found.replace("−", "-")) for found in NUMBER.findall(word)] for word in (a, b)]
@@ -153,7 +147,7 @@ def _same(a: str, b: str) -> bool:
     return all(math.isclose(x, y, rel_tol=5e-5, abs_tol=1e-12) for x, y in zip(*values, strict=True))
 
 
-def test_comparison() -> None:
+def test_comparison():
     """The comparison itself sees a wrong figure and a missing line."""
     compare(" torque │ -18552.9 │ N m\n", "other\ntorque ┃ -18552.8749 N m\n", "here")
     with pytest.raises(AssertionError):
@@ -163,7 +157,7 @@ def test_comparison() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_code_named_exists(page: Path) -> None:
+def test_code_named_exists(page):
     """A module, class or function that the text names by its path inside the package is there."""
     text = FENCE.sub("", page.read_text("utf-8"))
     for path in sorted(set(re.findall(rf"`((?:{LAYERS})(?:\.\w+)+)`", text))):
@@ -171,11 +165,11 @@ def test_code_named_exists(page: Path) -> None:
             assert _resolve(f"trunnion.{path}"), f"{page.relative_to(ROOT)}: there is no {path}"
 
 
-def _resolve(path: str) -> bool:
+def _resolve(path):
     parts = path.split(".")
     for cut in range(len(parts), 0, -1):
         try:
-            found: Any = importlib.import_module(".".join(parts[:cut]))
+            found = importlib.import_module(".".join(parts[:cut]))
         except ModuleNotFoundError:
             continue
         for name in parts[cut:]:
@@ -186,7 +180,7 @@ def _resolve(path: str) -> bool:
     return False
 
 
-def test_every_key_of_the_model_is_told() -> None:
+def test_every_key_of_the_model_is_told():
     """docs/meanings.yaml tells every key of every section, and no other; those of a measure are told by the code."""
     yaml = pytest.importorskip("yaml")
     from trunnion.model import joint_parts, measure_table, mechanism, parts, tolerance_parts
@@ -198,7 +192,7 @@ def test_every_key_of_the_model_is_told() -> None:
     assert all(field.description for field in measure_table.Measure.model_fields.values())
 
 
-def test_every_table_is_placed() -> None:
+def test_every_table_is_placed():
     """Each generated table stands on a page, and each place for one has a table."""
     pytest.importorskip("mkdocs")
     pytest.importorskip("latex2mathml")
@@ -216,7 +210,7 @@ def test_every_table_is_placed() -> None:
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md"])
-def test_parts_of_the_press_are_those_of_the_file(page: str) -> None:
+def test_parts_of_the_press_are_those_of_the_file(page):
     """Every line of the model that these pages show stands in the example that their commands run."""
     model = (ROOT / "examples" / "drawing-press.yaml").read_text("utf-8").splitlines()
     shown = [line for one in blocks(ROOT / page) if one.language == "yaml" for line in one.text.splitlines()]

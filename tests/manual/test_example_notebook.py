@@ -4,7 +4,6 @@ import os
 import warnings
 from html import unescape
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,7 +11,7 @@ NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebook.ipynb"
 
 
 @pytest.fixture(scope="module")
-def shown() -> dict[str, dict[str, Any]]:
+def shown():
     """By the last line of a code cell what it shows, by media type, after a run of all in a kernel of their own."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the notebook's own machinery
@@ -23,7 +22,7 @@ def shown() -> dict[str, dict[str, Any]]:
         own = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # that of notebooks
         client = NotebookClient(book, timeout=300, resources={"metadata": {"path": str(NOTEBOOK.parent)}})
         client.execute(env=own)
-    found: dict[str, dict[str, Any]] = {}
+    found = {}
     for cell in (cell for cell in book.cells if cell.cell_type == "code"):
         assert {output.output_type for output in cell.outputs} <= {"execute_result", "display_data"}, cell
         found[cell.source.splitlines()[-1]] = {
@@ -32,14 +31,14 @@ def shown() -> dict[str, dict[str, Any]]:
     return found
 
 
-def test_it_is_kept_without_outputs() -> None:
+def test_it_is_kept_without_outputs():
     text = NOTEBOOK.read_text("utf-8")
     assert '"outputs": []' in text
     assert "image/png" not in text
 
 
 @pytest.mark.slow
-def test_every_cell_shows_what_it_says(shown: dict[str, dict[str, Any]]) -> None:
+def test_every_cell_shows_what_it_says(shown):
     mechanism = shown["mechanism"]["text/html"]
     assert "<svg" in mechanism
     assert "I(0,1)R → II(2,3)RRR" in mechanism

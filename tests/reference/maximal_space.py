@@ -167,17 +167,10 @@ def point(frame: Frame) -> Data:
 GAPS = {"prismatic": (0, 1), "cylindrical": (0, 1), "planar": (2,), "helical": (0, 1), "pin": (0, 1), "slot": (1,)}
 ALIGNED = ((0, 2), (1, 2))
 SQUARE: dict[str, tuple[tuple[int, int], ...]] = {
-    "revolute": ALIGNED,
-    "prismatic": (*ALIGNED, (0, 1)),
-    "cylindrical": ALIGNED,
-    "spherical": (),
-    "universal": ((2, 2),),
-    "helical": ALIGNED,
-    "planar": ALIGNED,
-    "fixed": (*ALIGNED, (0, 1)),
-    "pin": (),
+    "revolute": ALIGNED, "prismatic": (*ALIGNED, (0, 1)), "cylindrical": ALIGNED, "spherical": (),
+    "universal": ((2, 2),), "helical": ALIGNED, "planar": ALIGNED, "fixed": (*ALIGNED, (0, 1)), "pin": (),
     "slot": ((1, 2),),
-}
+}  # fmt: skip
 SLIDING = ("prismatic", "slot")  # a drive moves them along z, the others about it
 
 

@@ -1,8 +1,6 @@
 """Allocation through the model: values of closed forms, exhaustive search, and the mechanism with what was found."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,37 +9,36 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import multivariate_normal
 
 import trunnion
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from trunnion import Mechanism, MechanismError
 from trunnion.results.attributes import summary_of
 from trunnion.studies.allocation.allocate import half_widths
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 LIMIT = np.radians(0.1)
 
 
-def slopes(count: int = 72) -> Any:
+def slopes(count=72):
     """∂θ₄/∂(ground, crank, coupler, rocker) at `count` angles, rad/m."""
     return 1e3 * rocker_sensitivities(2 * np.pi * np.arange(count) / count)
 
 
-def fourbar(**sections: Any) -> Mechanism:
+def fourbar(**sections):
     """The example with other sections."""
-    return Mechanism(**{**trunnion.read(EXAMPLES / "toleranced-fourbar.yaml").data(), **sections})
+    return Mechanism(**{**example("toleranced-fourbar").data(), **sections})
 
 
-def findings(result: Any, severity: str) -> list[str]:
+def findings(result, severity):
     return [
         f"{row['where']}: {row['what']}" for row in json.loads(result.attrs["findings"]) if row["severity"] == severity
     ]
 
 
-def dimensions(result: Any, key: str = "tolerance") -> Any:
+def dimensions(result, key="tolerance"):
     """Of l1 … l4, half widths in mm."""
     return 1e3 * result[key].sel(parameter=[f"dimensions.l{i}" for i in range(1, 5)]).values
 
 
-def by_one_limit(angle: float, criterion: str = "worst-case") -> tuple[Any, float]:
+def by_one_limit(angle, criterion="worst-case"):
     """Half widths, mm, and cost of the example with its limit at one crank angle alone, in closed form."""
     s, b, k = np.abs(rocker_sensitivities(np.array([angle])))[0], np.array([1, 0.6, 1, 0.8]), 0.45
     if criterion == "worst-case":
@@ -54,7 +51,7 @@ def by_one_limit(angle: float, criterion: str = "worst-case") -> tuple[Any, floa
 
 
 @pytest.mark.parametrize("criterion", ["worst-case", "rss"])
-def test_limits_are_kept_over_the_whole_cycle(criterion: str) -> None:
+def test_limits_are_kept_over_the_whole_cycle(criterion):
     """Σ B/t^0.45, |Δθ₄| ≤ 0.1°: the dearest single angle keeps all others, whatever the steps and the start."""
     place = minimize_scalar(
         lambda angle: -by_one_limit(angle, criterion)[1], bounds=(0.2, 0.5), method="bounded", options={"xatol": 1e-12}
@@ -63,9 +60,7 @@ def test_limits_are_kept_over_the_whole_cycle(criterion: str) -> None:
     dense = np.abs(slopes(100_000)) * t / 1e3 / LIMIT
     assert np.max(np.linalg.norm(dense, axis=1, ord=1 if criterion == "worst-case" else 2)) < 1 + 1e-8
     for start, steps in ((0.001, 12), (1.0, 360)):
-        model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml").with_tolerances(
-            {f"l{i}": start * 1e-3 for i in range(1, 5)}
-        )
+        model = example("toleranced-fourbar").with_tolerances({f"l{i}": start * 1e-3 for i in range(1, 5)})
         result = trunnion.allocate(model, criterion=criterion, steps=steps, samples=0)
         assert dimensions(result) == pytest.approx(t, rel=5e-5)  # the cost is flat at its least
         assert float(result["cost_total"]) == pytest.approx(cost, rel=1e-8)
@@ -78,7 +73,7 @@ def test_limits_are_kept_over_the_whole_cycle(criterion: str) -> None:
 
 
 @pytest.mark.parametrize("criterion", ["worst-case", "rss"])
-def test_closed_forms_of_one_limit(criterion: str) -> None:
+def test_closed_forms_of_one_limit(criterion):
     """t ∝ (B/|S|)^(1/(k + 1)) in the worst case, t ∝ (B/S²)^(1/(k + 2)) of RSS."""
     model = fourbar(measures={"θ": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}})
     result = trunnion.allocate(model, criterion=criterion, samples=0)
@@ -92,9 +87,9 @@ def test_closed_forms_of_one_limit(criterion: str) -> None:
     assert float(result["saving"][0]) == pytest.approx(fall, rel=2e-3)
 
 
-def test_plays_are_bought() -> None:
+def test_plays_are_bought():
     """A play has the loads of its pin under a unit load at the measure; none stated is a start like any other."""
-    model = trunnion.read(EXAMPLES / "piston-by-cost.yaml")
+    model = example("piston-by-cost")
     result = trunnion.allocate(model, samples=0)
     expected = [0.0567249, 0.03482455, 0.01382013, 0.01382013, 0.0181095]
     # a gap of 1e-6 leaves half widths open by 1e-3; the solver comes to some 1e-6
@@ -106,9 +101,9 @@ def test_plays_are_bought() -> None:
     assert float(result["searched_upper"][0]) == pytest.approx(1e-4, rel=1e-3)
 
 
-def test_exact_worst_case() -> None:
+def test_exact_worst_case():
     """The worst case of the mechanism itself is at the limit, and costs a little more than that of first order."""
-    model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    model = example("toleranced-fourbar")
     linear, exact = (trunnion.allocate(model, steps=72, samples=0, exact=one) for one in (False, True))
     worst = max(-float(exact["searched_lower"][0]), float(exact["searched_upper"][0]))
     assert worst == pytest.approx(LIMIT, rel=2e-6)
@@ -117,9 +112,9 @@ def test_exact_worst_case() -> None:
     assert not findings(exact, "warning")
 
 
-def test_yield() -> None:
+def test_yield():
     """The share of samples is the one asked for, within its interval, and costs less than the worst case."""
-    model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    model = example("toleranced-fourbar")
     result = trunnion.allocate(model, criterion="yield", target=0.95, steps=36, samples=4000)
     low, share, high = (float(result[f"yield_all{end}"]) for end in ("_low", "", "_high"))
     assert low <= 0.95 <= high
@@ -132,9 +127,9 @@ def test_yield() -> None:
 
 
 @pytest.mark.slow
-def test_options_as_stated_cost_what_keeps_them() -> None:
+def test_options_as_stated_cost_what_keeps_them():
     """A half width between two options is bought as the cheapest that keeps it; one below all has no cost."""
-    data = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data()
+    data = example("fourbar-by-grades").data()
     for stated, cost in {"±0.02 mm": 11.8, "±0.03 mm": 4.2, "±0.2 mm": 1.5, "±0.007 mm": np.nan}.items():
         model = Mechanism(**{**data, "tolerances": {**data["tolerances"], "l2": stated}})
         result = trunnion.allocate(model, steps=12, samples=0)
@@ -143,7 +138,7 @@ def test_options_as_stated_cost_what_keeps_them() -> None:
         assert float(result["cost_total_before"]) == pytest.approx(cost + grades + 4 * 1.6, nan_ok=True)
 
 
-def test_several_limits_have_one_margin() -> None:
+def test_several_limits_have_one_margin():
     """Room over standard deviation is the same for both; the yield is that of their normal distribution."""
     places, halves, target = (300, 140), np.radians([0.1, 0.08]), 0.95
     measures = {
@@ -163,8 +158,8 @@ def test_several_limits_have_one_margin() -> None:
 
 
 @pytest.mark.slow
-def test_a_yield_that_is_to_be_sure_has_it_at_the_lower_end_of_fresh_samples() -> None:
-    model = trunnion.read(EXAMPLES / "piston-by-cost.yaml")
+def test_a_yield_that_is_to_be_sure_has_it_at_the_lower_end_of_fresh_samples():
+    model = example("piston-by-cost")
     plain, sure = (
         trunnion.allocate(model, criterion="yield", target=0.95, steps=12, samples=2000, sure=each)
         for each in (False, True)
@@ -174,7 +169,7 @@ def test_a_yield_that_is_to_be_sure_has_it_at_the_lower_end_of_fresh_samples() -
     assert float(sure["cost_total"]) > float(plain["cost_total"])
 
 
-def test_bounds_of_a_figure() -> None:
+def test_bounds_of_a_figure():
     """at_least and at_most leave room to one side each: from the nominal figure."""
     course = trunnion.tolerance(fourbar(), ["rotation:D"], ["linear"], at="60 deg", steps=4)
     nominal = float(course["nominal"][0])
@@ -184,7 +179,7 @@ def test_bounds_of_a_figure() -> None:
     assert np.abs(slopes()[12]) @ dimensions(result) * 1e-3 == pytest.approx(LIMIT, rel=1e-7)
 
 
-def test_lopsided_tolerances_take_room() -> None:
+def test_lopsided_tolerances_take_room():
     """The middle of the limits moves the measure by itself."""
     tolerances = {f"l{i}": "±0.03 mm" for i in range(1, 5)} | {"l3": "+0.04/-0.02 mm"}
     model = fourbar(tolerances=tolerances, measures={"θ": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}})
@@ -213,7 +208,7 @@ def test_lopsided_tolerances_take_room() -> None:
     ],
     ids=lambda one: "-".join(map(str, one.values())),
 )
-def test_measures_keep_their_limits(measure: dict[str, str]) -> None:
+def test_measures_keep_their_limits(measure):
     """The worst case that is found on the mechanism keeps the limits, to second order, and samples do."""
     result = trunnion.allocate(fourbar(measures={"m": measure}), steps=24, samples=300)
     assert result.attrs["found"]
@@ -222,7 +217,7 @@ def test_measures_keep_their_limits(measure: dict[str, str]) -> None:
     assert 0.2 < float(result["used"][0]) <= 1 + 1e-6
 
 
-def same_figures(results: list[Any]) -> None:
+def same_figures(results):
     """All figures but those of positions are the same to 1e-8."""
     for result in results[1:]:
         for name, figure in results[0].items():
@@ -242,7 +237,7 @@ def same_figures(results: list[Any]) -> None:
     ids=("path", "lead", "effort"),
 )
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
-def test_no_figure_depends_on_the_steps(measure: dict[str, str], criterion: Any) -> None:
+def test_no_figure_depends_on_the_steps(measure, criterion):
     model, samples = fourbar(measures={"m": measure}), 400
     same_figures([trunnion.allocate(model, criterion=criterion, steps=steps, samples=0) for steps in (7, 12, 120, 361)])
     if criterion == "yield":
@@ -253,7 +248,7 @@ def test_no_figure_depends_on_the_steps(measure: dict[str, str], criterion: Any)
         same_figures([trunnion.tolerance(model, methods=methods, samples=samples, steps=steps) for steps in (7, 120)])
 
 
-def test_a_distance_is_kept_in_every_direction_at_least_cost() -> None:
+def test_a_distance_is_kept_in_every_direction_at_least_cost():
     """Σ B/t^0.45 with Σ |u·∂C/∂l| t ≤ 0.05 mm for all unit vectors u at all angles, by SLSQP on a grid of both."""
     model = fourbar(measures={"m": {"path_error": "coupler.C", "limit": "±0.05 mm"}})
     result = trunnion.allocate(model, samples=0)
@@ -263,9 +258,9 @@ def test_a_distance_is_kept_in_every_direction_at_least_cost() -> None:
     assert float(linear["worst_case_upper"][0]) == pytest.approx(5e-5, rel=1e-6)
 
 
-def test_an_absurd_price_proves_nothing() -> None:
+def test_an_absurd_price_proves_nothing():
     """An option that nobody would take leaves the choice among the others as sharp as it is without it."""
-    data = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data()
+    data = example("fourbar-by-grades").data()
     plain = trunnion.allocate(Mechanism(**data), samples=0)
     gold = {"gold": {"tolerance": "1 um", "cost": 1e15}}
     costs = {**data["costs"], "l2": {"options": {**data["costs"]["l2"]["options"], **gold}}}
@@ -275,7 +270,7 @@ def test_an_absurd_price_proves_nothing() -> None:
     assert float(dear["gap"]) == pytest.approx(float(plain["gap"]), abs=1e-9)
 
 
-def test_run_outs_and_seats_stay_as_they_are() -> None:
+def test_run_outs_and_seats_stay_as_they_are():
     """A run-out that points anywhere has no middle; a pin whose seat is given has no play to choose."""
     data = fourbar().data()
     data["tolerances"]["joints.B.misalignment.offset"] = {"limits": "+0.01/0 mm", "direction": "uniform"}
@@ -289,15 +284,15 @@ def test_run_outs_and_seats_stay_as_they_are() -> None:
     assert float(result["cost_total"]) > 16.6
 
 
-def test_curve_of_cost_over_accuracy() -> None:
-    result = trunnion.allocate(trunnion.read(EXAMPLES / "toleranced-fourbar.yaml"), steps=36, samples=0, curve=3)
+def test_curve_of_cost_over_accuracy():
+    result = trunnion.allocate(example("toleranced-fourbar"), steps=36, samples=0, curve=3)
     assert result["trade_off_factor"].values == pytest.approx([0.5, 1, 2])
     # of a power model without a constant part the cost goes with the power of the limits
     assert result["trade_off_cost"].values == pytest.approx(float(result["cost_total"]) * np.array([2, 1, 0.5]) ** 0.45)
     assert result["trade_off_tolerance"].values[2, :4] == pytest.approx(2 * result["tolerance"].values[:4])
 
 
-def test_what_cannot_be_allocated() -> None:
+def test_what_cannot_be_allocated():
     for model, text in (
         (fourbar(costs={}), "no tolerance has a cost"),
         (fourbar(measures={}), "no measure is stated"),
@@ -307,7 +302,7 @@ def test_what_cannot_be_allocated() -> None:
             trunnion.allocate(model)
 
 
-def test_a_tolerance_without_effect_is_not_bounded_by_rounding() -> None:
+def test_a_tolerance_without_effect_is_not_bounded_by_rounding():
     """The toggle of a press is straight at the least height whatever its crank is, whose slope there is rounding."""
     press = Mechanism(
         dimensions={"a": 0.25, "r": 0.09},

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from allocations import PRICES, bought, four_bar, random_costs, random_options, rocker_sensitivities, rows, solve
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 from scipy.stats import multivariate_normal
@@ -14,20 +13,19 @@ from scipy.stats import multivariate_normal
 from trunnion.errors import Severity
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, SampledYield
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution, SampledYield
 from trunnion.studies.allocation.yields import normal_yield
 
-Array = NDArray[np.float64]
 # The cost is flat at its least: half widths that are off by a share ε cost ε² more. The gap that is claimed, 1e-6,
 # leaves them open by 1e-3; what the solver comes to at its own tolerance is below 1e-8 of the cost.
 COST, HALF_WIDTH = 1e-8, 1e-5
 
 
-def slsqp(problem: AllocationProblem, start: Array) -> tuple[float, Array]:
+def slsqp(problem, start):
     """SciPy's SLSQP from a start, in log t; half widths and cost."""
     costs = [one.cost for one in problem.contributions]
 
-    def cost(x: Array) -> float:
+    def cost(x):
         return sum(one.value(float(t)) for one, t in zip(costs, np.exp(x), strict=True) if one)
 
     limits = {"type": "ineq", "fun": lambda x: 1 - problem.used(np.exp(x))}
@@ -38,7 +36,7 @@ def slsqp(problem: AllocationProblem, start: Array) -> tuple[float, Array]:
     return float(found.fun), np.exp(found.x)
 
 
-def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree() -> None:
+def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree():
     problem = four_bar()
     answer = solve(problem)
     assert answer.tolerances == pytest.approx((0.035238, 0.021336, 0.028878, 0.034654), abs=5e-7)
@@ -57,7 +55,7 @@ def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
-def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
+def test_one_row_has_its_closed_form(criterion, seed):
     """Worst case t ∝ (k B/|S|)^(1/(k+1)), else (k B/S²)^(1/(k+2)), with the same k: scaled to the limit."""
     rng = np.random.default_rng(seed)
     k, s, b, limit = rng.uniform(0.3, 2.5), rng.uniform(-3, 3, 6), rng.uniform(0.1, 5, 6), rng.uniform(1e-4, 1)
@@ -76,7 +74,7 @@ def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_the_dual_of_a_worst_case_is_worth_its_cost(seed: int) -> None:
+def test_the_dual_of_a_worst_case_is_worth_its_cost(seed):
     """With prices λ of the rows each half width is by itself where k B/t^(k+1) = Σ λ|S|, or at a bound: six decades."""
     rng = np.random.default_rng(seed)
     effect, limit = rng.normal(size=(12, 5)) * 10 ** rng.uniform(-3, 3, 5), rng.uniform(0.1, 0.5, 12)
@@ -92,11 +90,11 @@ def test_the_dual_of_a_worst_case_is_worth_its_cost(seed: int) -> None:
 @pytest.mark.spread(12)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
-def test_random_problems_agree_with_scipy(criterion: Criterion, seed: int) -> None:
+def test_random_problems_agree_with_scipy(criterion, seed):
     rng = np.random.default_rng(seed)
     count, many = int(rng.integers(2, 7)), int(rng.integers(2, 30))
     effect = rng.normal(size=(many, count))
-    more: dict[str, Array] = {}
+    more = {}
     if seed % 2:
         more["offset"] = rng.uniform(-0.05, 0.05, many)
         more["drift"] = 0.1 * rng.normal(size=(many, count))
@@ -113,7 +111,7 @@ def test_random_problems_agree_with_scipy(criterion: Criterion, seed: int) -> No
     assert answer.cost == pytest.approx(cost, rel=1e-5)
 
 
-def test_fixed_grouped_and_bounded_tolerances() -> None:
+def test_fixed_grouped_and_bounded_tolerances():
     problem = four_bar()
     l1, l2, l3, l4 = problem.contributions
     mixed = replace(
@@ -138,14 +136,14 @@ def test_fixed_grouped_and_bounded_tolerances() -> None:
     assert t[0] == pytest.approx(room, rel=1e-9)
 
 
-def test_limits_on_one_side_and_off_the_middle() -> None:
+def test_limits_on_one_side_and_off_the_middle():
     """0.3 of the room is taken by the middle of the tolerances; the other side has no limit."""
     costs = [Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})]
     effects = rows(np.ones((1, 1)), 1.0, lower=np.array([-np.inf]), offset=np.array([0.3]))
     assert solve(AllocationProblem(bought(costs), effects)).tolerances[0] == pytest.approx(0.7, rel=1e-12)
 
 
-def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
+def test_what_cannot_be_met_says_where_and_by_how_much():
     problem = four_bar()
     held = tuple(replace(one, least=0.05) for one in problem.contributions)
     answer = solve(replace(problem, contributions=held))
@@ -154,14 +152,14 @@ def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
     assert f"the deviation is {worst:+.6g}" in str(answer.findings[0])
 
 
-def test_a_tolerance_that_nothing_limits_is_refused() -> None:
+def test_a_tolerance_that_nothing_limits_is_refused():
     costs = [Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})] * 2
     effects = rows(np.array([[1.0, 0.0]]), 1.0)
     assert "state `most`" in str(solve(AllocationProblem(bought(costs), effects)).findings[0])
     assert solve(AllocationProblem(bought(costs, most=3.0), effects)).tolerances == pytest.approx([1.0, 3.0])
 
 
-def exhaustive(problem: AllocationProblem) -> float:
+def exhaustive(problem):
     """The least cost of all choices, infinite if none keeps the limits."""
     best = np.inf
     for picked in itertools.product(*(one.options for one in problem.contributions)):
@@ -175,7 +173,7 @@ def exhaustive(problem: AllocationProblem) -> float:
 @pytest.mark.spread(20)
 @pytest.mark.parametrize("seed", range(24))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
-def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion: Criterion, seed: int) -> None:
+def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion, seed):
     rng = np.random.default_rng(seed)
     many = int(rng.integers(1, 40))
     effect, limit = rng.normal(size=(many, 4)), rng.uniform(0.15, 0.5, many)
@@ -199,7 +197,7 @@ def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion: Cri
 @pytest.mark.spread(12)
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
-def test_a_mixture_equals_the_best_of_all_choices(criterion: Criterion, seed: int) -> None:
+def test_a_mixture_equals_the_best_of_all_choices(criterion, seed):
     rng = np.random.default_rng(100 + seed)
     many = int(rng.integers(1, 20))
     effects = rows(rng.normal(size=(many, 4)), rng.uniform(0.1, 0.5, many), criterion)
@@ -218,7 +216,7 @@ def test_a_mixture_equals_the_best_of_all_choices(criterion: Criterion, seed: in
         assert answer.proven
 
 
-def test_a_group_takes_the_option_of_one_name() -> None:
+def test_a_group_takes_the_option_of_one_name():
     grades = (ProcessChoice("IT7", 0.01, 9.0), ProcessChoice("IT8", 0.02, 5.0), ProcessChoice("IT9", 0.03, 2.0))
     larger = tuple(ProcessChoice(one.name, 1.5 * one.tolerance, one.cost + 1) for one in grades)
     parts = (Contribution("a", options=grades, group="g"), Contribution("b", options=larger, group="g"))
@@ -232,14 +230,14 @@ PLAIN = Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})
 
 
 @pytest.mark.parametrize("target", [0.9, 0.9973, 0.999999])
-def test_one_row_has_the_margin_of_the_normal_distribution(target: float) -> None:
+def test_one_row_has_the_margin_of_the_normal_distribution(target):
     problem = AllocationProblem(bought([PLAIN] * 3), rows(np.array([[1.0, -2.0, 0.5]]), 0.1, "yield"))
     answer = solve(problem, target=target)
     assert answer.problem.z == pytest.approx(ndtri((1 + target) / 2), rel=1e-6)
     assert answer.expected == pytest.approx(target, abs=1e-9)
 
 
-def test_dependent_shifted_rows_agree_with_scipy() -> None:
+def test_dependent_shifted_rows_agree_with_scipy():
     """Two rows of three deviations, the first with a shift: the normal distribution of two numbers over a box."""
     effect, mean = np.array([[1.0, 2.0, -1.0], [0.5, -1.0, 2.0]]), np.array([[0.3, 0.0, 0.2], [0.0, 0.0, 0.0]])
     problem = AllocationProblem(bought([PLAIN] * 3), rows(effect, np.array([0.1, 0.12]), "yield", mean))
@@ -252,7 +250,7 @@ def test_dependent_shifted_rows_agree_with_scipy() -> None:
 
 @pytest.mark.parametrize("sure", [False, True])
 @pytest.mark.parametrize("low_and_high", [(0.45, 0.55), (0.87, 0.91)])
-def test_a_yield_that_fresh_samples_never_have_is_told(low_and_high: tuple[float, float], sure: bool) -> None:
+def test_a_yield_that_fresh_samples_never_have_is_told(low_and_high, sure):
     """An error, but a note if it may be chance and nobody asks to be sure."""
     problem, fresh = four_bar("yield", positions=12), SampledYield(sum(low_and_high) / 2, *low_and_high)
     chosen = SampledYield(0.901, 0.9005, 0.92)
@@ -264,7 +262,7 @@ def test_a_yield_that_fresh_samples_never_have_is_told(low_and_high: tuple[float
 
 
 @pytest.mark.parametrize(("room", "kept"), [(0.12, True), (0.09, False)])
-def test_samples_decide_where_the_distribution_has_no_tail(room: float, kept: bool) -> None:
+def test_samples_decide_where_the_distribution_has_no_tail(room, kept):
     """A fixed contribution that is ±0.1 at either end, and another limit: z σ = 0.26 for normal ones is far beyond."""
     parts = (Contribution("fixed", 1.0), *bought([PLAIN] * 2))
     effects = replace(
@@ -274,7 +272,7 @@ def test_samples_decide_where_the_distribution_has_no_tail(room: float, kept: bo
     problem = AllocationProblem(parts, effects)
     assert [finding.code for finding in solve(problem, target=0.99).findings] == ["yield.missed"]
 
-    def verify(t: Array, number: int) -> SampledYield:
+    def verify(t, number):
         """Every contribution at either end of its tolerance, half and half: no tail at all."""
         ends = np.random.default_rng(5 + number).choice([-1.0, 1.0], size=(20_000, 3))
         share = float(np.mean(np.all(np.abs(ends @ (effects.spread * t).T) <= effects.upper, axis=1)))
@@ -293,7 +291,7 @@ def test_samples_decide_where_the_distribution_has_no_tail(room: float, kept: bo
 
 
 @pytest.mark.parametrize("mean", [0.4, -0.4])
-def test_a_shift_counts_on_the_side_it_moves_to(mean: float) -> None:
+def test_a_shift_counts_on_the_side_it_moves_to(mean):
     """A deviation of mean m t and standard deviation t/3 keeps z of them within ±0.1: (z/3 + |m|) t = 0.1."""
     effects = rows(np.array([[1.0]]), 0.1, "yield", np.array([[mean]]))
     answer = solve(AllocationProblem(bought([PLAIN]), effects, z=2.5))

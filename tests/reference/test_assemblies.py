@@ -6,8 +6,6 @@ circles, and what remains, the length of the third rod, is looked at for changes
 
 import copy
 import re
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,39 +16,38 @@ from hypothesis import strategies as st
 import trunnion
 from brief import brief
 from mechanisms import MODELS, analyse, build, class_three, findings, four_bar
-from mechanisms_parts import Data, corner, joined
+from mechanisms_parts import corner, example, joined
 from timed import PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.namespace import flat
 from trunnion.errors import Severity
-from trunnion.solve.assembly_modes import GroupModes, choices, put_together
+from trunnion.solve.assembly_modes import choices, put_together
 from trunnion.solve.hints import hints
 from trunnion.solve.run import prepare
 from trunnion.views.assembly import places
 
 START = np.array([0.0])
-EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
 
-def named(data: Data, **assembly: str) -> Data:
+def named(data, **assembly):
     """The data with assemblies chosen by name alone."""
     return {**copy.deepcopy(data), "assembly": assembly}
 
 
-def choice_of(data: Data) -> GroupModes:
+def choice_of(data):
     (choice,) = trunnion.check(build(data), 12).choices
     return choice
 
 
 @pytest.mark.parametrize(("link", "name", "side"), [("coupler", "way-1", 1.0), ("rocker", "way-2", -1.0)])
-def test_the_ways_of_a_four_bar_are_those_chosen_by_place(link: str, name: str, side: float) -> None:
+def test_the_ways_of_a_four_bar_are_those_chosen_by_place(link, name, side):
     by_name, by_place = (analyse(data, 24) for data in (named(four_bar(), **{link: name}), four_bar(side=side)))
     for variable in ("point_position", "drive_effort", "reaction_force"):
         assert np.array_equal(by_name[variable], by_place[variable], equal_nan=True)
     assert not [one for one in findings(by_name) if one["where"].startswith("assembly")]
 
 
-def test_the_list_of_a_four_bar_is_the_two_meets_of_two_circles() -> None:
+def test_the_list_of_a_four_bar_is_the_two_meets_of_two_circles():
     """B = (0.3, 0), D = (1, 0): C at distance 0.9 from B and 0.7 from D."""
     choice = choice_of(four_bar())
     along = (0.9**2 - 0.7**2 + 0.7**2) / (2 * 0.7)
@@ -67,7 +64,7 @@ def test_the_list_of_a_four_bar_is_the_two_meets_of_two_circles() -> None:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("name", MODELS)
-def test_every_listed_way_is_what_its_name_gives(name: str) -> None:
+def test_every_listed_way_is_what_its_name_gives(name):
     """The joints lie where the list says, and nothing is left to say about the choice."""
     mechanism = build(MODELS[name]())
     for choice in trunnion.check(mechanism, 12).choices:
@@ -83,7 +80,7 @@ def test_every_listed_way_is_what_its_name_gives(name: str) -> None:
                 assert [float(np.ravel(n)[0]) for n in found] == pytest.approx(place, abs=1e-9)
 
 
-def test_a_start_in_line_is_listed_where_its_ways_are_apart() -> None:
+def test_a_start_in_line_is_listed_where_its_ways_are_apart():
     """A parallelogram that starts in line: at the start both ways put C on one spot."""
     choice = choice_of(four_bar(0.3, 1.0, 0.3, 1.0))
     assert choice.where == "1° of A"
@@ -91,10 +88,10 @@ def test_a_start_in_line_is_listed_where_its_ways_are_apart() -> None:
     assert np.hypot(*(places[0] - places[1])) > 1e-3
 
 
-def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
+def test_the_ways_of_a_class_three_group_are_all_there_are():
     """Angles of the plate at which the third rod has its length, P by the lengths of the other two."""
     turn = np.linspace(-np.pi, np.pi, 3601)
-    expected: list[float] = []
+    expected = []
     for side in (1, -1):
         p = corner(0.1, 1.4 - 0.15j - 0.6 * np.exp(1j * turn), 0.8485, 0.7566, side)
         gap = np.abs(p + (0.25 + 0.5j) * np.exp(1j * turn) - (0.55 + 1.9j)) - 0.8944
@@ -113,7 +110,7 @@ def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("model", "link", "pin"), [(four_bar, "rocker", "C"), (class_three, "plate", "P")])
-def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> None:
+def test_a_name_beats_a_place_and_says_so(model, link, pin):
     data = model()
     by_place = next(way for way in choice_of(data).ways if way.taken)
     for way in choice_of(data).ways:
@@ -123,7 +120,7 @@ def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> No
         assert found == ([] if way.name == by_place.name else [Severity.WARNING])
 
 
-def stated(text: str) -> dict[str, Any]:
+def stated(text):
     """The places, slides and turns of a printed way, as they would be written into a model file."""
     unit = text.partition(";")[0].rpartition(" ")[2]
     points = {name: [f"{n} {unit}" for n in row.split(", ")] for name, row in re.findall(r"(\S+) \(([^)]*)\)", text)}
@@ -132,7 +129,7 @@ def stated(text: str) -> dict[str, Any]:
     return {**points, **slides, **turns}
 
 
-def selected_by_what_is_printed(mechanism: Mechanism) -> int:
+def selected_by_what_is_printed(mechanism):
     """How many ways are listed; each is selected, and nothing left undecided, by its printed places alone."""
     run, count = prepare(mechanism), 0
     data = mechanism.data()
@@ -154,7 +151,7 @@ def selected_by_what_is_printed(mechanism: Mechanism) -> int:
 @pytest.mark.parametrize("space", [planar, spatial], ids=["planar", "spatial"])
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=4, deadline=None)
-def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space: Any, seed: int) -> None:
+def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space, seed):
     _, data = space.drawn(seed)
     try:
         mechanism = Mechanism(**data)
@@ -167,7 +164,7 @@ def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space: Any, seed
 @pytest.mark.slow
 @given(turn=st.floats(-1e-3, 1e-3), crank=st.floats(0.1, 0.5), longer=st.sampled_from([0.0, 1e-9, 1e-6, 1e-3, 0.1]))
 @settings(max_examples=15, deadline=None)
-def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer: float) -> None:
+def test_ways_that_nearly_meet_are_told_apart(turn, crank, longer):
     """A linkage that starts in line, or nearly so, or only closes farther on, has as many digits as it takes."""
     data = named(four_bar(crank, 0.7, 0.6, 1.3 - crank + longer))
     data["drivers"]["A"]["start"] = float(np.pi + turn)
@@ -176,9 +173,9 @@ def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["swash-plate-pump", "double-cardan"])
-def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
+def test_the_turn_of_a_universal_joint_is_a_hint(name):
     """Its place is the same in several ways; its turn about its first pin is not."""
-    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    mechanism = example(name)
     (choice,) = trunnion.check(mechanism, 12).choices
     assert any(mechanism.joints[joint].type == "universal" for joint in choice.ways[0].turns)
     assert selected_by_what_is_printed(mechanism) == len(choice.ways)
@@ -186,7 +183,7 @@ def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "share"), [("four-bar", 0.7), ("class III", 0.7), ("in space", 0.2)])
-def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
+def test_a_hint_holds_where_its_driver_is(name, share):
     """Of every assembly the places at a position of the driver select it, though at the start others are nearer."""
     (a, b, c, d), at = PARALLELOGRAM
     models = {"four-bar": lambda: build(four_bar()), "class III": lambda: build(class_three()),
@@ -210,7 +207,7 @@ def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
                 np.testing.assert_allclose(is_, was, atol=1e-9)
 
 
-def jacked(first: str, **tube: Any) -> Mechanism:
+def jacked(first, **tube):
     """An arm on a hinge that a driven strut holds: universal or ball, slide, ball."""
     hinge, slide = {"at": [0, 0, 0], "axis": [0, 1, 0]}, {"at": [0, 0, 0], "axis": [1, 0, 0]}
     cross = first == "universal"
@@ -229,7 +226,7 @@ def jacked(first: str, **tube: Any) -> Mechanism:
 
 
 @pytest.mark.slow
-def test_half_turns_of_a_strut_are_no_assemblies_of_their_own() -> None:
+def test_half_turns_of_a_strut_are_no_assemblies_of_their_own():
     """The ball of the arm meets a sphere about U on two places; a cross holds the tube in two turns at each."""
     (choice,) = trunnion.check(jacked("universal"), 12).choices
     (spins,) = trunnion.check(jacked("spherical"), 12).choices
@@ -249,20 +246,20 @@ def test_half_turns_of_a_strut_are_no_assemblies_of_their_own() -> None:
 JOINTS = {"S": "spherical", "R": "revolute", "P": "prismatic", "C": "cylindrical", "U": "universal"}
 
 
-def drawn(seed: int) -> Mechanism:
+def drawn(seed):
     """A linkage that grows by groups between random points, drawn in one frame for all its links.
 
     Every third in space; some begin before or after where they are drawn.
     """
     rng, spatial = np.random.default_rng(seed), seed % 3 == 2
     size, last = 3 if spatial else 2, "crank"
-    links: dict[str, Any] = {"ground": {}}
-    joints: dict[str, Any] = {}
+    links = {"ground": {}}
+    joints = {}
 
-    def add(kind: str, *ends: str) -> None:
+    def add(kind, *ends):
         """A joint at a random place, on both links alike."""
         name, place = f"{kind}{len(joints)}", rng.uniform(-1, 1, size).tolist()
-        axes: list[dict[str, Any]] = [{}, {}]
+        axes = [{}, {}]
         if (spatial and kind != "S") or kind == "P":
             axis = rng.normal(size=size)
             other = np.cross(axis, rng.normal(size=size)) if kind == "U" else axis
@@ -271,7 +268,7 @@ def drawn(seed: int) -> Mechanism:
         for link, more in zip(ends, axes, strict=True):
             links.setdefault(link, {})[name] = {"at": place, **more} if more else place
 
-    def anchor() -> str:
+    def anchor():
         return str(rng.choice(list(links)))
 
     add("R", "ground", "crank")
@@ -299,7 +296,7 @@ def drawn(seed: int) -> Mechanism:
 
 
 @pytest.mark.parametrize(("first", "count"), [(0, 12), pytest.param(12, 30, marks=pytest.mark.slow)])
-def test_random_linkages_are_assembled_as_drawn(first: int, count: int) -> None:
+def test_random_linkages_are_assembled_as_drawn(first, count):
     """Where the driver is as drawn, the frames of all links coincide; without a warning that one had to choose."""
     looked = 0
     for seed in range(first, first + count):

@@ -1,20 +1,16 @@
 """Does it assemble at all: closed forms, an independent closure with SciPy's optimiser, invariances, what is said."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from numpy.linalg import inv
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import trunnion
-from mechanisms_parts import Data, joined
+from mechanisms_parts import joined
 from trunnion.studies.assembly import AssemblyStatus
 
-Array = NDArray[np.float64]
 LENGTHS = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker
 PIN = 0.020
 LEAN = {"tilt": np.radians(0.2)}
@@ -22,7 +18,7 @@ UPRIGHT = {"axis": [0, 0, 1], "x": [1, 0, 0]}
 OPEN = 1e-12
 
 
-def hinges(apart: float, pin: float, second: Data, kind: str = "revolute") -> trunnion.Mechanism:
+def hinges(apart, pin, second, kind="revolute"):
     """A leaf on two coaxial hinges."""
     points = {"A": {"at": [0, 0, 0], **UPRIGHT}, "B": {"at": [0, 0, apart], **UPRIGHT}}
     return trunnion.Mechanism(
@@ -35,7 +31,7 @@ def hinges(apart: float, pin: float, second: Data, kind: str = "revolute") -> tr
     )
 
 
-def four_bar(errors: Data, pins: Data | None = None) -> Data:
+def four_bar(errors, pins=None):
     """A planar four-bar drawn in space, pins upright; errors and pins by joint."""
     ground, crank, coupler, rocker = ({"at": [length, 0, 0], **UPRIGHT} for length in LENGTHS)
     here = {"at": [0, 0, 0], **UPRIGHT}
@@ -59,18 +55,18 @@ def four_bar(errors: Data, pins: Data | None = None) -> Data:
     }
 
 
-def solved(data: Data | trunnion.Mechanism, steps: int = 12, **options: Any) -> xr.Dataset:
+def solved(data, steps=12, **options):
     mechanism = data if isinstance(data, trunnion.Mechanism) else trunnion.Mechanism(**data)
     return trunnion.assemble(mechanism, steps, **options)
 
 
-def sound(result: xr.Dataset) -> None:
+def sound(result):
     """Every position closes exactly, and no position could do with less."""
     assert float(result.closure_residual.max()) < OPEN
     assert float(np.abs(result.certificate).max()) < 1e-9
 
 
-def leaned(apart: float, pin: float, tilt: float) -> float:
+def leaned(apart, pin, tilt):
     """Smallest clearance of two coaxial pin holes, one leaned by `tilt`, of a pin line free along its axis.
 
     In the plane of the tilt the line x = a + m z passes the holes' end planes; the second hole's slope against it is
@@ -89,7 +85,7 @@ def leaned(apart: float, pin: float, tilt: float) -> float:
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("apart", "pin"), [(0.3, 0.03), (0.05, 0.04)])
 @pytest.mark.parametrize("degrees", [0.02, 0.2, 1.0])
-def test_hinges_with_a_leaned_hole(apart: float, pin: float, degrees: float) -> None:
+def test_hinges_with_a_leaned_hole(apart, pin, degrees):
     lean = {"misalignment": {"tilt": np.radians(degrees), "towards": 0.7}}
     found = solved(hinges(apart, pin, lean, "cylindrical"), 3)
     sound(found)
@@ -103,7 +99,7 @@ def test_hinges_with_a_leaned_hole(apart: float, pin: float, degrees: float) -> 
     )
 
 
-def test_hinges_with_a_hole_out_of_line() -> None:
+def test_hinges_with_a_hole_out_of_line():
     """The line through both middles leans by e/D in each hole: ρ = e H/(2 D), exact, for the holes are parallel."""
     apart, pin, offset = 0.3, 0.03, 1e-4
     second = {"misalignment": {"offset": offset, "offset_towards": 2.0}}
@@ -112,14 +108,14 @@ def test_hinges_with_a_hole_out_of_line() -> None:
     np.testing.assert_allclose(found.needed_clearance, offset * pin / (2 * apart), rtol=1e-7)
 
 
-def along(x: float) -> Array:
+def along(x):
     """A way along x."""
     found = np.eye(4)
     found[0, 3] = x
     return found
 
 
-def turned(angle: Array) -> Array:
+def turned(angle):
     """A turn about z."""
     found = np.zeros((*np.shape(angle), 4, 4))
     c, s = np.cos(angle), np.sin(angle)
@@ -128,7 +124,7 @@ def turned(angle: Array) -> Array:
     return found
 
 
-def leaned_by(slope: Array, way: Array) -> Array:
+def leaned_by(slope, way):
     """The least turn that lays z along (s, t, 1), and a way in the plane; slope and way (…, 2).
 
     Rodrigues' formula about (−t, s, 0) by φ, tan φ = |(s, t)|: with c = cos φ, sin φ = c |(s, t)| and
@@ -149,7 +145,7 @@ def leaned_by(slope: Array, way: Array) -> Array:
 class Loop:
     """The closure of the four-bar in homogeneous matrices, no code shared with the library; (…, turns or ends)."""
 
-    def __init__(self, errors: Data, crank: float) -> None:
+    def __init__(self, errors, crank):
         ground, length, coupler, rocker = LENGTHS
         self.crank = crank
         self.holes = {joint: self.leaned(errors.get(joint, {}), rocker * (joint == "C")) for joint in "ABCD"}
@@ -157,18 +153,18 @@ class Loop:
         self.along, self.ground = along(coupler), along(ground)
 
     @staticmethod
-    def leaned(error: Data, x: float) -> Array:
+    def leaned(error, x):
         """Frame of a hole at x, leaned by its error."""
         way = error.get("towards", 0.0)
         side = np.array([np.cos(way), np.sin(way)])
         return along(x) @ leaned_by(np.tan(error.get("tilt", 0.0)) * side, error.get("offset", 0.0) * side)
 
-    def hole(self, joint: str, c: Array) -> Array:
+    def hole(self, joint, c):
         """Frame of the pin in a link: as its ends c (…, 2, 2) lie in the leaned hole."""
         one, two = c[..., 0, :], c[..., 1, :]
         return np.asarray(self.holes[joint] @ leaned_by((two - one) / PIN, (one + two) / 2))
 
-    def open(self, q: Array, c: Array) -> Array:
+    def open(self, q, c):
         """Turn and way (over the ground's length) by which the rocker misses its bearing; c (…, joint, end, 2)."""
         at = self.turned @ inv(self.hole("A", c[..., 0, :, :]))
         at = at @ self.driven @ turned(q[..., 0]) @ inv(self.hole("B", c[..., 1, :, :]))
@@ -178,7 +174,7 @@ class Loop:
         way = [missing[..., i, 3] / LENGTHS[0] for i in range(3)]
         return np.stack([*(one / 2 for one in turn), *way], axis=-1)
 
-    def home(self) -> Array:
+    def home(self):
         """Turns of B, C and D of the ideal linkage, the coupler's end above the ground."""
         ground, crank, coupler, rocker = LENGTHS
         b = crank * np.exp(1j * self.crank)
@@ -188,14 +184,14 @@ class Loop:
         rock = np.angle(b + coupler * np.exp(1j * angle) - ground)
         return np.array([angle - self.crank, rock - angle, rock])
 
-    def closed_within(self, radius: float, seed: int) -> float:
+    def closed_within(self, radius, seed):
         """Least opening, over radius/pin length, with all ends within `radius`, from a random start."""
         rng, home, unit = np.random.default_rng(seed), self.home(), radius / PIN
 
-        def rows(x: Array) -> Array:
+        def rows(x):
             return self.open(home + unit * x[..., :3], radius * x[..., 3:].reshape(*x.shape[:-1], 4, 2, 2)) / unit
 
-        def slope(x: Array) -> Array:
+        def slope(x):
             step = 1e-4
             return 2 * rows(x) @ ((rows(x + step * np.eye(19)) - rows(x - step * np.eye(19))) / (2 * step)).T
 
@@ -212,7 +208,7 @@ class Loop:
 
 
 @pytest.mark.slow
-def test_four_bar_against_an_independent_closure() -> None:
+def test_four_bar_against_an_independent_closure():
     errors = {"B": {**LEAN, "towards": 0.5}}
     found = solved(four_bar(errors))
     sound(found)
@@ -222,7 +218,7 @@ def test_four_bar_against_an_independent_closure() -> None:
     offsets = found.uniform_offset.isel(position=place).values[:, :2, :2]
     np.testing.assert_allclose(np.hypot(*np.moveaxis(offsets, -1, 0)).max(), need, rtol=1e-9)
 
-    def turns(q: Array) -> Array:
+    def turns(q):
         return loop.open(q, offsets)
 
     q = loop.home()  # the library's offsets close the other geometry: three turns, six equations
@@ -238,7 +234,7 @@ def test_four_bar_against_an_independent_closure() -> None:
 
 
 @pytest.mark.slow
-def test_stated_clearances_enough_and_not() -> None:
+def test_stated_clearances_enough_and_not():
     errors = {"B": LEAN}
     rigid = solved(four_bar(errors))
     assert (rigid.status == AssemblyStatus.RIGID).all()
@@ -256,7 +252,7 @@ def test_stated_clearances_enough_and_not() -> None:
 
 
 @pytest.mark.slow
-def test_part_is_the_derivative() -> None:
+def test_part_is_the_derivative():
     """A little more clearance in one pin lowers the needed share of all by its part."""
     errors, clearance, more = {"B": LEAN}, 2e-5, 1e-9
     flat = solved(four_bar(errors, {name: {"clearance": clearance} for name in "ABCD"}), 4)
@@ -268,7 +264,7 @@ def test_part_is_the_derivative() -> None:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("name", ["bennett", "sarrus", "rssr", "durango-fourbar"])
-def test_axes_that_fit_and_joints_that_do_not_constrain_twice_need_nothing(name: str) -> None:
+def test_axes_that_fit_and_joints_that_do_not_constrain_twice_need_nothing(name):
     found = solved(trunnion.read(f"examples/{name}.yaml"), 12)
     assert (found.status == AssemblyStatus.FITS).all()
     assert (found.needed_clearance == 0).all()
@@ -276,7 +272,7 @@ def test_axes_that_fit_and_joints_that_do_not_constrain_twice_need_nothing(name:
 
 
 @pytest.mark.slow
-def test_where_it_cannot_be_assembled() -> None:
+def test_where_it_cannot_be_assembled():
     """A linkage that does not turn all the way says where, with its answer elsewhere."""
     data = four_bar({"B": LEAN})
     data["links"]["crank"]["points"]["B"]["at"] = [0.065, 0, 0]
@@ -290,7 +286,7 @@ def test_where_it_cannot_be_assembled() -> None:
 
 
 @pytest.mark.slow
-def test_errors_that_are_not_small() -> None:
+def test_errors_that_are_not_small():
     """The sequence of cone programmes settles on the exact closure there too; the need is nearly proportional."""
     degrees = 15.0
     small, large = (solved(four_bar({"B": {"tilt": np.radians(tilt)}}), 4) for tilt in (0.01, degrees))

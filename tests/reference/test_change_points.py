@@ -1,11 +1,7 @@
 """Linkages through their change points, against closed forms: the links go on smoothly, with forces by virtual work."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brief import brief, judged
 from mechanisms_parts import joined
@@ -13,17 +9,16 @@ from timed import ANTIPARALLELOGRAM, DELTOID, PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, Status, analyse, simulate
 from trunnion.solve.run import prepare
 
-Array = NDArray[np.float64]
 TURN = 2 * np.pi
 MASSES = {"crank": 2.0, "coupler": 3.0, "rocker": 1.5}
 GRAVITY, PUSH, BRAKE, AT = 9.81, (12.0, -30.0), -7.0, (0.4, 0.3)
 
 
-def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, turns: float | None) -> Mechanism:
+def four_bar(a, b, c, d, hint, begin, turns):
     """Masses in the middles of the links, a push on the coupler and a brake on the rocker; without friction."""
     where = {"start": begin} if turns is None else {"range": [begin, begin + turns * TURN]}
     sides = {"crank": ("A", "B", a), "coupler": ("B", "C", b), "rocker": ("D", "C", c)}
-    links: dict[str, Any] = {
+    links = {
         name: {"points": {first: [0, 0], last: [length, 0]}, "mass": MASSES[name], "centre": [length / 2, 0]}
         for name, (first, last, length) in sides.items()
     }
@@ -41,25 +36,25 @@ def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, tu
     )  # fmt: skip
 
 
-def parallel(a: float, d: float) -> Callable[[Array], Array]:
+def parallel(a, d):
     return lambda theta: d + a * np.exp(1j * theta)
 
 
-def crossed(a: float, d: float) -> Callable[[Array], Array]:
+def crossed(a, d):
     """tan(φ/2) = −tan(θ/2) (d + a)/(d − a), from d (cos φ − cos θ) + a (1 − cos(φ − θ)) = 0."""
 
-    def place(theta: Array) -> Array:
+    def place(theta):
         return d + a * np.exp(2j * np.arctan2(-(d + a) * np.sin(theta / 2), (d - a) * np.cos(theta / 2)))
 
     return place
 
 
-def mirrored(a: float, d: float) -> Callable[[Array], Array]:
+def mirrored(a, d):
     """Crank and coupler alike, rocker and ground alike: C is A mirrored in the line from B to D."""
     return lambda theta: d - d * np.exp(2j * np.angle(d - a * np.exp(1j * theta)))
 
 
-def swung(d: float, b: float) -> Callable[[Array], Array]:
+def swung(d, b):
     """Crank and ground alike, coupler and rocker alike: C is on the bisector in A; back after two turns."""
     return lambda theta: (
         np.exp(1j * theta / 2) * (d * np.cos(theta / 2) + np.sqrt(b * b - (d * np.sin(theta / 2)) ** 2))
@@ -75,13 +70,13 @@ LINKAGES = {
 }
 
 
-def hinted(place: Callable[[Array], Array], begin: float) -> dict[str, list[float]]:
+def hinted(place, begin):
     at = complex(place(np.array(begin)))
     return {"C": [at.real, at.imag]}
 
 
 @pytest.mark.parametrize("name", LINKAGES)
-def test_linkages_go_on_smoothly(name: str) -> None:
+def test_linkages_go_on_smoothly(name):
     """Place of C; forces are right; of some over as many turns of the crank as bring the links back."""
     sides, place = LINKAGES[name]
     begin, whole = 0.7, name in ("kite", "deltoid")
@@ -94,7 +89,7 @@ def test_linkages_go_on_smoothly(name: str) -> None:
     judged(mechanism.data(), result)
 
 
-def test_a_linkage_folds_where_that_is_stated() -> None:
+def test_a_linkage_folds_where_that_is_stated():
     """C stays on its side of the line from B to D: a parallelogram becomes an antiparallelogram at 180°."""
     sides, place = LINKAGES["parallelogram"]
     other = LINKAGES["antiparallelogram"][1]
@@ -107,7 +102,7 @@ def test_a_linkage_folds_where_that_is_stated() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["deltoid", "antiparallelogram"])
-def test_in_space(kind: str) -> None:
+def test_in_space(kind):
     """A general group, which is followed by Newton's method, goes on as the closed form does."""
     sides, place = LINKAGES[kind]
     result = analyse(driven_four_bar("spatial", sides, hinted(place, 1.0)["C"]), 101)
@@ -119,7 +114,7 @@ def test_in_space(kind: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "space"), [("parallelogram", "planar"), ("kite", "spatial")])
-def test_positions_where_assemblies_meet_have_no_forces(name: str, space: str) -> None:
+def test_positions_where_assemblies_meet_have_no_forces(name, space):
     """With the status that says so, also of a general group; those beside them have them: the motion is one."""
     sides, place = LINKAGES[name]
     if space == "planar":
@@ -143,9 +138,7 @@ def test_positions_where_assemblies_meet_have_no_forces(name: str, space: str) -
         pytest.param(ANTIPARALLELOGRAM, crossed(0.3, 1.0), "spatial", 1.0, marks=pytest.mark.slow),
     ],
 )
-def test_motions_in_time_go_on_as_smoothly(
-    kind: Any, place: Callable[[Array], Array], space: str, sense: float
-) -> None:
+def test_motions_in_time_go_on_as_smoothly(kind, place, space, sense):
     """From rest under 2 N m: ½ J(θ) θ̇² = T (θ − θ₀), J from the closed form of the place of C."""
     (a, b, c, d), hint = kind
     motor = {"kind": "constant", "effort": sense * 2.0}
@@ -163,7 +156,7 @@ def test_motions_in_time_go_on_as_smoothly(
     np.testing.assert_allclose(0.5 * inertia * rate**2, 2.0 * np.abs(theta - 1.0), rtol=1e-5, atol=1e-6)
 
 
-def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
+def random_change_point_linkage(rng):
     """A four-bar whose shortest and longest side are together as long as the others, with a dyad on its rocker."""
     short, middle, other = np.sort(rng.uniform(0.2, 1.0, 3))
     longest = middle + other - short
@@ -181,7 +174,7 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
 
 
 @pytest.mark.slow
-def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated() -> None:
+def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated():
     passed, jumped, count = 0, 0, 40
     for seed in range(count):
         mechanism = random_change_point_linkage(np.random.default_rng(seed))

@@ -4,15 +4,11 @@ The pin's shift against the screw along the common perpendicular of two lines, 5
 seats against an optimiser over the play; friction against the balance of a contact.
 """
 
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy import optimize
 
-from reference.maximal_space import Array
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.algebra.space import Frame as RigidFrame
 from trunnion.joints.clearance import (
     CLEARANCE_MODELS,
     ellipse_error,
@@ -27,7 +23,7 @@ mp.mp.dps = 50
 CASES = 20_000
 
 
-def numbers(frame: RigidFrame) -> tuple[Array, Array]:
+def numbers(frame):
     """Rotation (3, 3, …) with the axes as columns, and place (3, …)."""
     axes = [[np.asarray(primal(axis[row])) for axis in frame[:3]] for row in range(3)]
     shape = np.broadcast_shapes(*(np.shape(n) for row in axes for n in row), *(np.shape(n) for n in frame.place))
@@ -35,7 +31,7 @@ def numbers(frame: RigidFrame) -> tuple[Array, Array]:
     return rotation_, np.array([np.broadcast_to(n, shape) for n in frame.place], float)
 
 
-def drawn(count: int = CASES, least: float = 1e-3) -> tuple[Array, Array, Array, Array]:
+def drawn(count=CASES, least=1e-3):
     """ρ and H in m, β away from 0, ξ."""
     rng = np.random.default_rng(5)
     rho, length = 10.0 ** rng.uniform(-6, -2, count), 10.0 ** rng.uniform(-2, 0, count)
@@ -43,7 +39,7 @@ def drawn(count: int = CASES, least: float = 1e-3) -> tuple[Array, Array, Array,
     return rho, length, beta, rng.uniform(-np.pi, np.pi, count)
 
 
-def test_shift_is_the_screw_along_the_common_perpendicular() -> None:
+def test_shift_is_the_screw_along_the_common_perpendicular():
     """20 000 pins: hole's axis z, pin's axis through C₁ and C₂ on circles of radius ρ at z = ∓H/2; to 1e-12.
 
     The middle of the pin is square to both axes from the middle of the hole: the screw leaves that way as it is.
@@ -63,7 +59,7 @@ def test_shift_is_the_screw_along_the_common_perpendicular() -> None:
     np.testing.assert_allclose(np.einsum("jin,jkn->nik", axes, axes), np.tile(np.eye(3), (CASES, 1, 1)), atol=1e-12)
 
 
-def precise(rho: Any, length: Any, beta: Any, xi: Any) -> tuple[list[list[Any]], list[Any]]:
+def precise(rho, length, beta, xi):
     """The same matrix in 50 digits: I + sin α [e]× + (1 − cos α) [e]×², and its place."""
     rho, length, beta, xi = (mp.mpf(n) for n in (rho, length, beta, xi))
     alpha, d = mp.atan(2 * rho / length * mp.sin(beta / 2)), rho * mp.cos(beta / 2)
@@ -75,7 +71,7 @@ def precise(rho: Any, length: Any, beta: Any, xi: Any) -> tuple[list[list[Any]],
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("exponent", [0, -1, -3, -6, -9, -12, -15, -100])
-def test_no_digit_is_lost_at_small_beta(exponent: int) -> None:
+def test_no_digit_is_lost_at_small_beta(exponent):
     """Tilt and displacement hold 15 digits of their own however small β is; so do those near β = π."""
     rng = np.random.default_rng(-exponent)
     for _ in range(100):
@@ -90,7 +86,7 @@ def test_no_digit_is_lost_at_small_beta(exponent: int) -> None:
                 assert all(abs(axis[i] - turn[i][k]) <= 3e-16 for i in range(3))
 
 
-def test_derivatives_of_the_shift() -> None:
+def test_derivatives_of_the_shift():
     """∂Â/∂(ρ, H, β, ξ) and by every end offset: dual parts against 50 digits, at β = 0 and π too."""
     rng = np.random.default_rng(11)
     for beta in (0.0, 1e-15, 1e-8, 0.3, -2.0, 3.0, float(np.pi)):
@@ -98,7 +94,7 @@ def test_derivatives_of_the_shift() -> None:
         for n in range(4):
             found = pin_transform(*(Dual(g, 1.0) if i == n else g for i, g in enumerate(given)))
 
-            def entry(number: Any, row: int, column: int, n: int = n, given: list[float] = given) -> Any:
+            def entry(number, row, column, n=n, given=given):
                 turn, place = precise(*(number if i == n else g for i, g in enumerate(given)))
                 return turn[row][column] if column < 3 else place[row]
 
@@ -113,7 +109,7 @@ def test_derivatives_of_the_shift() -> None:
 
 # what the play of a pair lets its pin do, from the picture: places of the ends along the axis in H (z; of a planar
 # guide x), what of the small motion t + φ × r there is held, and which parts of force and moment it carries
-PICTURE: dict[tuple[str, str], tuple[list[tuple[float, str]], str]] = {
+PICTURE = {
     ("planar", "revolute"): ([(0.0, "xy")], "xy"),
     ("planar", "prismatic"): ([(-0.5, "y"), (0.5, "y")], "yc"),
     ("spatial", "revolute"): ([(-0.5, "xy"), (0.5, "xy"), (0.0, "z")], "xyzab"),
@@ -124,7 +120,7 @@ PICTURE: dict[tuple[str, str], tuple[list[tuple[float, str]], str]] = {
 MODELS = [(space, kind) for space, models in CLEARANCE_MODELS.items() for kind in models]
 
 
-def held(space: str, kind: str, length: float) -> list[Array]:
+def held(space, kind, length):
     """For each end the matrix that takes the small motion (t, φ), in the parts that count, to the end's offset."""
     ends, parts = PICTURE[space, kind]
     columns = ["xyzabc".index(part) for part in parts]
@@ -136,15 +132,15 @@ def held(space: str, kind: str, length: float) -> list[Array]:
     return found
 
 
-def best_motion(matrices: list[Array], radii: Array, load: Array) -> tuple[Array, float]:
+def best_motion(matrices, radii, load):
     """Small motion of most work, load · motion, with every end within its radius: by SLSQP from the middle."""
     scale = np.array([1.0 / max(np.max(np.abs(np.vstack(matrices)[:, k])), 1e-9) for k in range(len(load))])
     work = load * scale / np.linalg.norm(load * scale)
 
-    def room(motion: Array) -> Array:
+    def room(motion):
         return np.array([r * r - np.sum((m @ (scale * motion)) ** 2) for m, r in zip(matrices, radii, strict=True)])
 
-    def slope(motion: Array) -> Array:
+    def slope(motion):
         return np.array([-2 * (m @ (scale * motion)) @ m * scale for m in matrices])
 
     result = optimize.minimize(
@@ -156,7 +152,7 @@ def best_motion(matrices: list[Array], radii: Array, load: Array) -> tuple[Array
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "kind"), MODELS)
-def test_loaded_seat_does_most_work(space: str, kind: str) -> None:
+def test_loaded_seat_does_most_work(space, kind):
     """F · t + M · φ over the play, against an optimiser: offsets to 1e-6 of the clearance."""
     play, rng = CLEARANCE_MODELS[space][kind], np.random.default_rng(17)
     parts = PICTURE[space, kind][1]
@@ -177,7 +173,7 @@ def test_loaded_seat_does_most_work(space: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize(("space", "kind"), MODELS)
-def test_offsets_are_what_the_shift_does_to_the_ends(space: str, kind: str) -> None:
+def test_offsets_are_what_the_shift_does_to_the_ends(space, kind):
     """The pin's frame of small offsets moves its ends by them: the linear part of the shift is the picture's."""
     play, rng, length, h = CLEARANCE_MODELS[space][kind], np.random.default_rng(2), 0.07, 1e-6
     matrices = np.vstack(held(space, kind, length))
@@ -196,7 +192,7 @@ def test_offsets_are_what_the_shift_does_to_the_ends(space: str, kind: str) -> N
         np.testing.assert_allclose(matrices @ motion[columns], flat, rtol=0, atol=1e-8 * h)  # next is (c/H)²
 
 
-def test_ends_carry_the_force_and_the_moment() -> None:
+def test_ends_carry_the_force_and_the_moment():
     """Σ Qᵢ = F and Σ rᵢ × Qᵢ = M in the parts that the play holds."""
     rng = np.random.default_rng(6)
     for space, kind in MODELS:
@@ -208,7 +204,7 @@ def test_ends_carry_the_force_and_the_moment() -> None:
         np.testing.assert_allclose(carried, wrench[columns], rtol=1e-13)
 
 
-def test_friction_turns_a_pin_against_the_slip() -> None:
+def test_friction_turns_a_pin_against_the_slip():
     """Q = N (n − μ t): t the way the hole's wall slips past the pin at the contact n, ω z × n; each end by itself."""
     rng = np.random.default_rng(21)
     for _ in range(300):
@@ -228,7 +224,7 @@ def test_friction_turns_a_pin_against_the_slip() -> None:
     assert turned_by_friction((3.0,), 0.3, (1.0,)) == (3.0,)
 
 
-def test_friction_turns_a_ball_about_its_spin() -> None:
+def test_friction_turns_a_ball_about_its_spin():
     """Q = N (n − μ t), t ∥ ω × n, for any load and spin; on the pole, within atan μ, it need not slip."""
     rng, poles = np.random.default_rng(23), 0
     for _ in range(500):
@@ -256,14 +252,14 @@ def test_friction_turns_a_ball_about_its_spin() -> None:
     assert turned_by_friction((1.0, 2.0, 3.0), 0.3, (0.0, 0.0, 0.0)) == (1.0, 2.0, 3.0)
 
 
-def room_of_an_ellipse(radius: Any, hole: Any, half: Any, angle: Any) -> Any:
+def room_of_an_ellipse(radius, hole, half, angle):
     """How far an ellipse (half its long axis along x) can shift from the middle of a circle along a direction.
 
     The largest c with |c n + e(τ)| ≤ R for all τ: for each point of the ellipse a quadratic in c, the least of them.
     """
     n = (mp.cos(angle), mp.sin(angle))
 
-    def reach(tau: Any) -> Any:
+    def reach(tau):
         x, y = half * mp.cos(tau), radius * mp.sin(tau)
         along, across = x * n[0] + y * n[1], x * n[1] - y * n[0]
         return -along + mp.sqrt(hole**2 - across**2)
@@ -273,7 +269,7 @@ def room_of_an_ellipse(radius: Any, hole: Any, half: Any, angle: Any) -> Any:
 
 
 @pytest.mark.parametrize("beta", [0.5, 1.5, 2.5, float(np.pi)])
-def test_circles_for_ellipses(beta: float) -> None:
+def test_circles_for_ellipses(beta):
     """A leaning pin's section is an ellipse r by r/cos α; where the seat lies it has less room than ρ.
 
     (2rρ/H²) sin⁴(β/2) is the share of the clearance that is missing, to first order in that share and in (ρ/H)²: the

@@ -1,22 +1,18 @@
 """All variables of a cycle by the compiled engine against NumPy's, with the locking margin and the statuses."""
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
 import trunnion
 from mechanisms import DURANGO
+from mechanisms_parts import EXAMPLES
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.cycle.positions import Positions, positions
+from trunnion.cycle.positions import positions
 from trunnion.solve.backward import status_of
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.solve.walk_kernel import WalkKernel
 
-EXAMPLES = DURANGO.parent
 OF_THE_ITERATION = {"friction_iterations", "friction_change", "friction_residual", "friction_contraction"}
 ROUNDING = {"power_residual", "closure_residual"}
 LAW = "joint_defaults.friction.coefficient"
@@ -25,19 +21,19 @@ RATIOS = 1e-6  # no sharper where the drive turns round
 
 
 @pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("compiled")))
         yield
 
 
-def both(mechanism: Mechanism, steps: int) -> tuple[Positions, Positions]:
+def both(mechanism, steps):
     run = prepare(mechanism)
     one, other = (positions(run, steps, averaged=False, engine=engine) for engine in ("numpy", "compiled"))
     return one, other
 
 
-def agree(one: Positions, other: Positions) -> None:
+def agree(one, other):
     """Statuses are equal, numbers agree to AGREE of the largest of their variable, and there is none for none."""
     np.testing.assert_array_equal(one.arrays["status"], other.arrays["status"])
     for name in one.arrays.keys() - OF_THE_ITERATION - ROUNDING:
@@ -63,11 +59,11 @@ MORE = [
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize("example", [*FEW, *(pytest.param(one, marks=pytest.mark.slow) for one in MORE)])
-def test_every_variable_agrees(example: str) -> None:
+def test_every_variable_agrees(example):
     agree(*both(trunnion.read(EXAMPLES / f"{example}.yaml"), 180))
 
 
-def test_positions_that_cannot_be_reached_or_lock_are_those_of_numpy() -> None:
+def test_positions_that_cannot_be_reached_or_lock_are_those_of_numpy():
     """A crank that is too long, and a coefficient at which the press locks: NumPy decides these positions."""
     long = trunnion.read(DURANGO)
     name = long.path_of("AB")
@@ -80,22 +76,22 @@ def test_positions_that_cannot_be_reached_or_lock_are_those_of_numpy() -> None:
         agree(one, other)
 
 
-def test_errors_stand_beside_the_ideal_mechanism() -> None:
+def test_errors_stand_beside_the_ideal_mechanism():
     one, other = both(trunnion.read(EXAMPLES / "fourbar-by-grades.yaml"), 60)
     agree(one, other)
 
 
-def kernel_of(figure: str) -> WalkKernel:
+def kernel_of(figure):
     return WalkKernel(prepare(trunnion.read(DURANGO)), {figure: lambda back: back.efforts["A"]})
 
 
-def curve(kernel: WalkKernel) -> Any:
+def curve(kernel):
     run = kernel.run
     (found,) = kernel.curves(run.values, run.cycle.times(24))[0].values()
     return found[0]
 
 
-def test_without_a_home_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_a_home_folder_it_is_compiled_anew(monkeypatch, tmp_path):
     """As of a user whom the system does not know: `docker run --user`."""
     expected = curve(kernel_of("one"))
     for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "USERPROFILE"):
@@ -107,7 +103,7 @@ def test_without_a_home_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPat
     assert not list(tmp_path.iterdir())
 
 
-def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_kept_code_of_another_law_is_not_taken(monkeypatch, tmp_path):
     """Another coefficient is the same program, another law is not."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     mechanism = trunnion.read(DURANGO)
@@ -116,7 +112,7 @@ def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, 
 
 
 @pytest.mark.slow
-def test_samples_are_the_same_by_any_number_of_threads() -> None:
+def test_samples_are_the_same_by_any_number_of_threads():
     mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
     one, other = (
         trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=9000, steps=30, engine="compiled", jobs=jobs)
@@ -134,7 +130,7 @@ def test_samples_are_the_same_by_any_number_of_threads() -> None:
         ("slider-crank", {LAW: ("0.05", "0.3", 4)}, True),
     ],
 )
-def test_a_sweep_has_the_figures_of_numpy(example: str, over: dict[str, Any], margin: bool) -> None:
+def test_a_sweep_has_the_figures_of_numpy(example, over, margin):
     mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
     one, other = (
         trunnion.sweep(mechanism, over, steps=90, margin=margin, engine=engine) for engine in ("numpy", "compiled")
@@ -150,7 +146,7 @@ def test_a_sweep_has_the_figures_of_numpy(example: str, over: dict[str, Any], ma
     np.testing.assert_array_equal(one["status"], other["status"])
 
 
-def test_pins_in_seats_are_left_to_numpy() -> None:
+def test_pins_in_seats_are_left_to_numpy():
     """They settle in rounds, as many as each position needs; those that are given too, for they travel."""
     mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
     given = mechanism.with_seats("free").with_values({"joints.B.seat": {"xi": "30 deg"}})
@@ -162,7 +158,7 @@ def test_pins_in_seats_are_left_to_numpy() -> None:
 @pytest.mark.parametrize(
     "method", [FrictionMethod("successive-approximation"), FrictionMethod(criterion=1e-3), FrictionMethod(limit=1)]
 )
-def test_friction_settled_otherwise_is_left_to_numpy(method: FrictionMethod, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_friction_settled_otherwise_is_left_to_numpy(method, monkeypatch):
     """A compiled program has its own fixed rounds of Newton's method: it would say converged where NumPy does not."""
     mechanism = trunnion.read(DURANGO)
     with pytest.raises(MechanismError) as caught:
@@ -177,7 +173,7 @@ def test_friction_settled_otherwise_is_left_to_numpy(method: FrictionMethod, mon
 
 
 @pytest.mark.slow
-def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch):
     monkeypatch.setattr("trunnion.cycle.cycle_kernel.WORTH_COMPILING", 1)
     mechanism = trunnion.read(EXAMPLES / "bennett.yaml")  # over-constrained
     one, other = (trunnion.analyse(mechanism, 8, engine=engine) for engine in ("auto", "numpy"))
@@ -187,7 +183,7 @@ def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pyte
     assert np.array_equal(swept[0]["drive_effort_max"], swept[1]["drive_effort_max"], equal_nan=True)
 
 
-def same_as_numpy(run: Run, names: Sequence[str], time: Any, spread: float = 1e-3) -> tuple[WalkKernel, Any]:
+def same_as_numpy(run, names, time, spread=1e-3):
     """Drive effort of five samples, numbers of these names a random share more or less, by both; the statuses."""
     mechanism, rng = run.system.mechanism, np.random.default_rng(4)
     paths = [mechanism.path_of(name) for name in names]
@@ -203,7 +199,7 @@ def same_as_numpy(run: Run, names: Sequence[str], time: Any, spread: float = 1e-
     return kernel, status
 
 
-LAWS: list[dict[str, Any]] = [
+LAWS = [
     {"law": "viscous", "coefficient": 0.1, "viscous": 0.05},
     {"law": "stribeck", "coefficient": 0.1, "static": 0.15, "stribeck_speed": 0.02, "viscous": 0.01},
     {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.15, "transition_speed": 0.02, "viscous": 0.01},
@@ -213,14 +209,14 @@ LAWS: list[dict[str, Any]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law["law"])
-def test_friction_laws_of_samples(law: dict[str, Any]) -> None:
+def test_friction_laws_of_samples(law):
     data = trunnion.read(DURANGO).data()
     data["joint_defaults"]["friction"] = law
     run = prepare(Mechanism(**data))
     same_as_numpy(run, ["AB", LAW], run.cycle.times(36))
 
 
-def test_friction_without_proof_of_one_solution_is_numpys() -> None:
+def test_friction_without_proof_of_one_solution_is_numpys():
     """Where friction may lock, no fixed number of rounds decides."""
     model = trunnion.read(EXAMPLES / "slider-crank.yaml")
     paths = [path for path in model.parameter_set.entries if path.endswith("friction.coefficient")]
@@ -229,7 +225,7 @@ def test_friction_without_proof_of_one_solution_is_numpys() -> None:
     assert same_as_numpy(run, sizes, run.cycle.times(36), 1e-4)[0].again > 0
 
 
-def test_failures_of_samples_are_those_of_numpy() -> None:
+def test_failures_of_samples_are_those_of_numpy():
     """Lengths so far off that some samples do not assemble and others come near to a dead centre."""
     run = prepare(trunnion.read(DURANGO))
     _, status = same_as_numpy(run, ["AB", "BC", "CD"], run.cycle.times(90), 0.2)

@@ -1,12 +1,9 @@
 """Pins and sliders in play as they move in time, against published values, closed forms and own equations."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import trunnion
@@ -27,8 +24,6 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.run import prepare
 
-Array = NDArray[np.float64]
-
 
 @pytest.mark.parametrize(
     ("law", "factor", "returned"),
@@ -36,42 +31,42 @@ Array = NDArray[np.float64]
      ("herbert-mcwhannell", 1.0, 0.593624260), ("lee-wang", 0.375, 0.799198782), ("gonthier", 1.5, 0.487741256),
      ("hu-guo", 1.5, 0.487741256), ("hertz", 0.0, 1.0)],
 )  # fmt: skip
-def test_what_comes_back_of_a_stated_half(law: str, factor: float, returned: float) -> None:
+def test_what_comes_back_of_a_stated_half(law, factor, returned):
     assert CONTACT_LAWS[law].factor(0.5) == pytest.approx(factor, rel=1e-14)
     assert restitution_of(CONTACT_LAWS[law].factor(0.5)) == pytest.approx(returned, abs=6e-10)
 
 
 @given(st.floats(1e-3, 1.0))
-def test_the_default_law_returns_what_is_stated(restitution: float) -> None:
+def test_the_default_law_returns_what_is_stated(restitution):
     assert restitution_of(loss_factor(restitution)) == pytest.approx(restitution, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", sorted(CONTACT_LAWS))
-def test_the_restitution_of_a_law_is_that_of_its_equation_of_motion(law: str) -> None:
+def test_the_restitution_of_a_law_is_that_of_its_equation_of_motion(law):
     """A mass against a wall, integrated here: whatever mass, stiffness and speed are."""
     factor = CONTACT_LAWS[law].factor(0.4)
     mass, stiffness, speed = 0.3, 4e9, 0.7
 
-    def rate(_: float, y: Array) -> list[float]:
+    def rate(_, y):
         force = stiffness * max(y[0], 0.0) ** 1.5 * (1 + factor * y[1] / speed)
         return [y[1], -force / mass]
 
-    def left(_: float, y: Array) -> float:
+    def left(_, y):
         return float(y[0])
 
-    left.terminal, left.direction = True, -1  # type: ignore[attr-defined]
+    left.terminal, left.direction = True, -1
     found = solve_ivp(rate, (0, 1.0), [0.0, speed], events=left, rtol=1e-11, atol=1e-16, max_step=1e-5)
     assert -found.y_events[0][0, 1] / speed == pytest.approx(restitution_of(factor), rel=1e-6)
 
 
-def test_stiffness_of_a_steel_pin_in_its_hole() -> None:
+def test_stiffness_of_a_steel_pin_in_its_hole():
     """By hand: σ = (1 − 0.09)/207 GPa for both, √(9.5·10/0.5) mm."""
     sigma = 0.91 / 207e9
     wanted = 4 / (3 * 2 * sigma) * np.sqrt(9.5e-3 * 10e-3 / 0.5e-3)
     assert hertz_stiffness(9.5e-3, 10e-3, 207e9, 207e9, 0.3, 0.3) == pytest.approx(wanted, rel=1e-14)
 
 
-def test_the_first_contact_of_a_rattling_pin() -> None:
+def test_the_first_contact_of_a_rattling_pin():
     """Time, speed, penetration and duration as known before; all of them and the force by own equations.
 
     Extrapolation (Gragg, Bulirsch, Stoer) of the same two equations in numbers of 40 digits, with √(t − t₀) in place of
@@ -96,14 +91,14 @@ def test_the_first_contact_of_a_rattling_pin() -> None:
 
 
 @pytest.mark.slow
-def test_a_turn_with_friction_in_the_other_joints() -> None:
+def test_a_turn_with_friction_in_the_other_joints():
     """Many contacts, and the books balance."""
     result = trunnion.simulate(rubbing(0.1), duration=2 * np.pi / SPEED, steps=200)
     assert result.sizes["impact"] > 15
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
 
 
-def test_the_reaction_in_play_is_the_contact_force() -> None:
+def test_the_reaction_in_play_is_the_contact_force():
     """On the slider by the rod; and the slider's mass times its acceleration, along the guide without friction."""
     result = trunnion.simulate(rattling(), duration=3e-4, steps=300)
     touching = result["contact_touching"].sel(contact="Q") == 1
@@ -115,7 +110,7 @@ def test_the_reaction_in_play_is_the_contact_force() -> None:
     assert np.allclose(0.14 * slide, force.sel(axis="x"), rtol=1e-7, atol=1e-6 * float(size.max()))
 
 
-def test_machine_code_has_the_rates_of_the_walks() -> None:
+def test_machine_code_has_the_rates_of_the_walks():
     for mechanism in (rattling(), both_pins(), loose_slider(), rubbing(SMOOTH), rubbing(0.1)):
         run = prepare(mechanism)
         motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
@@ -134,7 +129,7 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
                 assert np.allclose(seen, wanted, rtol=1e-9, atol=1e-15)
 
 
-def test_a_rod_that_no_joint_holds() -> None:
+def test_a_rod_that_no_joint_holds():
     """Both its pins in play: momentum of rod and slider along the guide changes by the crank pin's force alone."""
     result = trunnion.simulate(both_pins(), duration=8e-4, steps=400)
     assert set(result["contact"].values) == {"P", "Q"}
@@ -147,7 +142,7 @@ def test_a_rod_that_no_joint_holds() -> None:
     assert np.allclose(force, 0.21 * centre + 0.14 * slider, rtol=1e-7, atol=1e-6 * float(abs(force).max()))
 
 
-def test_friction_at_the_contact_only_loses() -> None:
+def test_friction_at_the_contact_only_loses():
     data = rattling().data()
     law = {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.15, "transition_speed": "0.05 m/s"}
     rubbed = {**data["joints"], "Q": {**data["joints"]["Q"], "friction": law}}
@@ -159,7 +154,7 @@ def test_friction_at_the_contact_only_loses() -> None:
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
 
 
-def test_other_analyses_leave_the_contact_out() -> None:
+def test_other_analyses_leave_the_contact_out():
     with_contact, without = (brief(rattling(one), steps=24) for one in (None, {}))
     assert np.array_equal(with_contact["reaction_force"], without["reaction_force"])
 
@@ -170,7 +165,7 @@ GUIDE = {"length": 0.1, "height": 0.05, "clearance": CLEARANCE}
 RIGID = {"law": "rigid", "restitution": 0.4}
 
 
-def guide(friction: float = 0.01, contact: dict[str, Any] | None = None, **initial: float) -> Mechanism:
+def guide(friction=0.01, contact=None, **initial):
     """The slider-crank with a slider in play of P. Flores, R. Leine, Ch. Glocker, Multibody Syst. Dyn. 23 (2010)
     165-190, doi:10.1007/s11044-009-9178-y."""
     return Mechanism(
@@ -190,34 +185,34 @@ def guide(friction: float = 0.01, contact: dict[str, Any] | None = None, **initi
     )  # fmt: skip
 
 
-def pin(contact: dict[str, Any], friction: float = 0.0) -> Mechanism:
+def pin(contact, friction=0.0):
     """The slider-crank with the worn pin at its slider, with another contact and friction there."""
     joints = rattling(contact).data()["joints"]
     return rattling(joints={**joints, "Q": {**joints["Q"], **({"friction": friction} if friction else {})}})
 
 
-def events(result: Any, kind: str, of: str) -> list[float]:
+def events(result, kind, of):
     rows = attribute(result, "events")
     return [float(t) for row, t in zip(rows, result["event_time"].values, strict=True) if row[:2] == [kind, of]]
 
 
-def balanced(result: Any) -> bool:
+def balanced(result):
     """Whether the energy account is right to 1e-8 of the energy turned over."""
     moved = max(float(np.nanmax(np.abs(result[name].values))) for name in ("work_drive", "work_contact"))
     return bool(np.nanmax(np.abs(result["energy_residual"].values)) < 1e-8 * moved)
 
 
-def codes(result: Any) -> list[str]:
+def codes(result):
     return [one.code for one in result.trunnion.findings]
 
 
 @pytest.mark.parametrize("restitution", [-0.1, 1.1])
-def test_a_restitution_is_from_0_to_1(restitution: float) -> None:
+def test_a_restitution_is_from_0_to_1(restitution):
     with pytest.raises(MechanismError, match=r"S\.contact\.restitution: is .*(at most 1|negative)"):
         guide(contact={**RIGID, "restitution": restitution})
 
 
-def test_a_slider_in_its_guide_strikes_closes_and_lifts_off() -> None:
+def test_a_slider_in_its_guide_strikes_closes_and_lifts_off():
     result = simulate(guide(), 16e-3, 32)
     for corner in ("S.1", "S.2"):  # the upper wall
         struck = events(result, "impact", corner)
@@ -240,7 +235,7 @@ def test_a_slider_in_its_guide_strikes_closes_and_lifts_off() -> None:
     assert impulse == pytest.approx(result["impact_impulse"].values[0])
 
 
-def test_the_speeds_after_the_first_impact() -> None:
+def test_the_speeds_after_the_first_impact():
     """ω⁺ of crank and rod, and their angles; the restitution is that of the gap."""
     after = FIRST + 1e-11
     result = simulate(guide(), 2 * after, 2)
@@ -253,7 +248,7 @@ def test_the_speeds_after_the_first_impact() -> None:
     assert np.all(result["impact_impulse"].values > 0)
 
 
-def test_impacts_without_end_are_ended_by_one_without_restitution(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_impacts_without_end_are_ended_by_one_without_restitution(monkeypatch):
     monkeypatch.setattr(impact_motion, "CROWD", 2)
     monkeypatch.setattr(impact_motion, "CROWDED", 1.0)
     result = simulate(guide(), 7e-3, 7)
@@ -264,7 +259,7 @@ def test_impacts_without_end_are_ended_by_one_without_restitution(monkeypatch: p
     assert balanced(result)
 
 
-def falling(restitution: float, **more: Any) -> Mechanism:
+def falling(restitution, **more):
     """A slider that falls through the play of its guide, on a shoe that holds it upright."""
     along, upward = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
     return Mechanism(
@@ -284,7 +279,7 @@ def falling(restitution: float, **more: Any) -> Mechanism:
 
 
 @pytest.mark.parametrize(("restitution", "drag"), [(0.3, 0.0), pytest.param(0.5, 2.0, marks=pytest.mark.slow)])
-def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: float, drag: float) -> None:
+def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution, drag):
     """It falls with g − R/m and rises with g + R/m under a resistance R beside it; all bounces are a geometric series,
     and the drop's energy is lost."""
     load = {"loads": {"drag": {"joint": "X", "resisting_force": drag}}} if drag else {}
@@ -302,7 +297,7 @@ def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: floa
 
 
 @pytest.mark.slow
-def test_an_impact_that_closes_a_contact_tears_a_joint_loose() -> None:
+def test_an_impact_that_closes_a_contact_tears_a_joint_loose():
     """The crank sticks until the slider, which falls, has landed; nothing of its energy is lost but in friction."""
     data = guide(0.0, {**RIGID, "restitution": 0.0}).data()
     data["joints"]["O"]["losses"] = {"constant": 0.5}
@@ -313,7 +308,7 @@ def test_an_impact_that_closes_a_contact_tears_a_joint_loose() -> None:
     assert balanced(found)
 
 
-def test_a_pin_closes_in_its_hole_and_the_account_is_right() -> None:
+def test_a_pin_closes_in_its_hole_and_the_account_is_right():
     """The crank is driven evenly: what it gives in an impact is part of the account."""
     result = simulate(pin({"law": "rigid", "restitution": 0.5}, 0.2), 1.5e-3, 15)
     struck = events(result, "impact", "Q")
@@ -326,7 +321,7 @@ def test_a_pin_closes_in_its_hole_and_the_account_is_right() -> None:
 
 
 @pytest.mark.slow
-def test_stiff_contacts_tend_to_rigid_impacts() -> None:
+def test_stiff_contacts_tend_to_rigid_impacts():
     """What misses falls with the time of a contact, as K^(−2/5): by 6.3 for a stiffness a hundred times as large."""
     rigid = simulate(pin({"law": "rigid", "restitution": 0.9}), 7e-4, 4)
     missed = []

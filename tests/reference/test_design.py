@@ -1,13 +1,12 @@
 """The designer's figures against closed forms and against the forces of the analysis."""
 
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import MODELS, Array, Data, build, four_bar, model, slider_crank
+from mechanisms import MODELS, build, four_bar, model, slider_crank
 from mechanisms_parts import bare
 from trunnion import Mechanism
 from trunnion.solve.forward import forward
@@ -15,14 +14,14 @@ from trunnion.solve.run import prepare
 from trunnion.studies import design as figures
 
 
-def test_dead_centres_of_the_case_study() -> None:
+def test_dead_centres_of_the_case_study():
     """THEORY: the rocker of Durango's four-bar turns back at 14.361511563° and 212.157208609°."""
     found = figures.design(trunnion.read("examples/durango-fourbar.yaml"))
     np.testing.assert_allclose(np.degrees(found.dead_centres["D"]), [14.361511563, 212.157208609], atol=1e-9)
     assert found.grashof == "crank-rocker"
 
 
-def test_slider_crank_turns_back_in_line() -> None:
+def test_slider_crank_turns_back_in_line():
     """r = 50, l = 200, e = 0: at 0 and 180°; the least transmission angle is acos(r/l)."""
     found = figures.design(trunnion.read("examples/toleranced-slider-crank.yaml"))
     np.testing.assert_allclose(found.dead_centres["S"], [0.0, np.pi], atol=1e-12)
@@ -32,20 +31,16 @@ def test_slider_crank_turns_back_in_line() -> None:
 @pytest.mark.parametrize(
     ("sides", "type_"),
     [
-        ((100, 30, 90, 70), "crank-rocker"),
-        ((30, 100, 90, 70), "double crank"),
-        ((100, 90, 30, 70), "double rocker"),
-        ((100, 70, 90, 30), "rocker-crank"),
-        ((100, 60, 70, 65), "triple rocker"),
-        ((100, 50, 100, 50), "change point"),
+        ((100, 30, 90, 70), "crank-rocker"), ((30, 100, 90, 70), "double crank"), ((100, 90, 30, 70), "double rocker"),
+        ((100, 70, 90, 30), "rocker-crank"), ((100, 60, 70, 65), "triple rocker"), ((100, 50, 100, 50), "change point"),
     ],
-)
-def test_grashof(sides: tuple[float, ...], type_: str) -> None:
+)  # fmt: skip
+def test_grashof(sides, type_):
     ground, crank, coupler, rocker = (side / 1000 for side in sides)
     assert figures.grashof(build(four_bar(crank, coupler, rocker, ground))) == type_
 
 
-def test_limits_of_a_rocker_input_by_the_law_of_cosines() -> None:
+def test_limits_of_a_rocker_input_by_the_law_of_cosines():
     """Input 4, coupler 6, output 3, ground 5.5: |BD| between 6 − 3 and 6 + 3."""
     a, b, c, g = 4.0, 6.0, 3.0, 5.5
     found = figures.design(trunnion.read("examples/durango-fourbar.yaml").with_values({"AB": a}))
@@ -56,7 +51,7 @@ def test_limits_of_a_rocker_input_by_the_law_of_cosines() -> None:
 
 
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "Watt six-bar", "class III"])
-def test_shaking_force_is_what_the_joints_pass_to_the_frame(name: str) -> None:
+def test_shaking_force_is_what_the_joints_pass_to_the_frame(name):
     """Without loads and gravity the frame feels the inertia and nothing else: forces and moments agree."""
     data = MODELS[name]()
     data.pop("loads", None)
@@ -80,7 +75,7 @@ def test_shaking_force_is_what_the_joints_pass_to_the_frame(name: str) -> None:
     np.testing.assert_allclose(turn, moment, atol=1e-9 * np.max(np.abs(moment)))
 
 
-def test_counterweights_cancel_the_shaking_force_of_a_four_bar() -> None:
+def test_counterweights_cancel_the_shaking_force_of_a_four_bar():
     """Added as masses they leave no shaking force; their sense is a mass opposite the crank pin."""
     mechanism = build(four_bar())
     run = prepare(mechanism)
@@ -100,7 +95,7 @@ def test_counterweights_cancel_the_shaking_force_of_a_four_bar() -> None:
     assert figures.design(trunnion.Mechanism(**data)).shaking_force < 1e-10 * plain
 
 
-def test_instant_centres_lie_where_the_velocities_agree_and_in_line() -> None:
+def test_instant_centres_lie_where_the_velocities_agree_and_in_line():
     """Kennedy: the three centres of any three links are collinear; the joints are centres themselves."""
     run = prepare(build(four_bar()))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(7)[1:])
@@ -113,14 +108,14 @@ def test_instant_centres_lie_where_the_velocities_agree_and_in_line() -> None:
         assert np.all(np.abs(area) < 1e-9 * span)
 
 
-def test_work_that_cancels_gives_no_efficiency() -> None:
+def test_work_that_cancels_gives_no_efficiency():
     """A constant force over a closed path does no net work, whatever the sampling leaves of it."""
     data = model(four_bar(), friction=None)
     data["drivers"] = {"A": {"law": "polynomial-345", "range": [0.0, 1.5], "duration": 0.5, "dwell": 0.1}}
     assert np.isnan(trunnion.analyse(Mechanism(**data), 360)["efficiency"])
 
 
-def test_a_link_at_rest_does_not_turn_back() -> None:
+def test_a_link_at_rest_does_not_turn_back():
     """A drive that rises, dwells, returns and dwells over a part of the stroke stops the slide, at no dead centre."""
     data = slider_crank()
     (driver,), (slide,) = data["drivers"], (n for n, one in data["joints"].items() if one["type"] == "prismatic")
@@ -132,19 +127,19 @@ DYADS = ["four-bar", "four-bar, other branch", "slider-crank", "inverted slider-
          "tangent drive"]  # fmt: skip
 
 
-def angles(mechanism: Mechanism, steps: int = 24) -> tuple[Any, Any, dict[str, Array]]:
+def angles(mechanism, steps=24):
     run = prepare(mechanism)
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     return run, walk, figures.pressure_angles(walk)
 
 
-def forwards(r: float, length: float, offset: float) -> Data:
+def forwards(r, length, offset):
     """A slider-crank that turns counterclockwise from 0."""
     return {**slider_crank(r, length, offset), "drivers": {"A": {"speed": 1.0}}}
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.1, -0.2])
-def test_slider_crank(offset: float) -> None:
+def test_slider_crank(offset):
     """sin φ = (e − r sin θ)/l for a slide along x."""
     r, length = 0.3, 1.0
     _, _, found = angles(build(forwards(r, length, offset)))
@@ -158,7 +153,7 @@ def test_slider_crank(offset: float) -> None:
 
 @pytest.mark.parametrize("name", DYADS)
 @pytest.mark.parametrize("loaded", [1, 0])
-def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name: str, loaded: int) -> None:
+def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name, loaded):
     """Massless, no friction, loads on one link of the dyad alone: the other is a two-force link."""
     mechanism = build({**bare(MODELS[name]()), "gravity": [0, 0]}).with_friction("off")
     module = next(one for one in prepare(mechanism).system.plan.modules if len(one.links) == 2)
@@ -176,7 +171,7 @@ def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name: str, loa
     place = walk.element(run.system.joints[acts_at][1][0], acts_at)
     reaction = run.solve(run.cycle.times(24)).reactions[c]
 
-    def velocity(link: str) -> tuple[Array, Array]:
+    def velocity(link):
         twist = walk.motions[link].twist
         return twist.x - twist.w * place.y, twist.y + twist.w * place.x
 

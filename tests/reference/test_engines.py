@@ -1,14 +1,10 @@
 """What is recorded and compiled gives the numbers of NumPy: operations, functions, loops, tables, in any split."""
 
 import os
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from benchmarks.engines import compared
-from numpy.typing import NDArray
 
 import trunnion
 from mechanisms import DURANGO
@@ -20,18 +16,17 @@ from trunnion.engines.recorded import Recorded, functions, number_of
 from trunnion.solve.run import prepare
 from trunnion.solve.walk_kernel import WalkKernel
 
-Array = NDArray[np.float64]
 SPECIAL = np.array([0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 1e-300, 5.0, -2.5])
 
 
 @pytest.fixture(autouse=True)
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path))
     return tmp_path
 
 
-def compiled(function: Callable[..., Sequence[Any]], *arrays: Array, width: int = 0) -> list[Any]:
+def compiled(function, *arrays, width=0):
     """What a kernel of rows of numbers gives."""
     graph = Graph()
     numbers = [Recorded(graph, graph.input(f"x{k}", POSITION)) for k in range(len(arrays))]
@@ -44,7 +39,7 @@ def compiled(function: Callable[..., Sequence[Any]], *arrays: Array, width: int 
     return [one[0] for one in found]
 
 
-def last_places(found: Array, exact: Any) -> float:
+def last_places(found, exact):
     """Largest error in units of the last place of the exact number."""
     return float(np.max(np.abs((found - exact) / np.spacing(np.abs(exact.astype(float))))))
 
@@ -54,7 +49,7 @@ def last_places(found: Array, exact: Any) -> float:
     [("sin", 10.0, 2.0), ("cos", 10.0, 2.0), ("sin", SINE_RANGE, 2.0), ("cos", SINE_RANGE, 2.0),
      ("exp", EXP_RANGE, 2.0), ("tanh", 30.0, 2.5), ("tanh", 1e-3, 2.5)],
 )  # fmt: skip
-def test_functions_are_exact_to_the_last_places(name: str, reach: float, most: float) -> None:
+def test_functions_are_exact_to_the_last_places(name, reach, most):
     """Against numbers of 64 binary digits."""
     rng = np.random.default_rng(3)
     x = np.concatenate([rng.uniform(-reach, reach, 50_001), np.arange(-9, 10) * np.pi / 2])
@@ -63,7 +58,7 @@ def test_functions_are_exact_to_the_last_places(name: str, reach: float, most: f
     assert last_places(found, getattr(np, name)(x.astype(np.longdouble))) <= most
 
 
-def test_the_angle_of_a_point_is_exact_to_the_last_places() -> None:
+def test_the_angle_of_a_point_is_exact_to_the_last_places():
     rng = np.random.default_rng(4)
     y, x = rng.normal(size=(2, 50_001)) * 10.0 ** rng.uniform(-9, 9, (2, 50_001))
     (found,) = compiled(lambda y, x: (np.arctan2(y, x),), y, x)
@@ -71,14 +66,14 @@ def test_the_angle_of_a_point_is_exact_to_the_last_places() -> None:
 
 
 @pytest.mark.parametrize("name", ["sin", "cos", "exp"])
-def test_beyond_its_range_a_function_is_no_number(name: str) -> None:
+def test_beyond_its_range_a_function_is_no_number(name):
     reach = EXP_RANGE if name == "exp" else SINE_RANGE
     (found,) = compiled(lambda x: (getattr(np, name)(x),), np.array([1.01, -1.01, np.inf, np.nan, 0.5] * 2) * reach)
     assert np.isnan(found).tolist() == [True, True, True, True, False] * 2
 
 
 @pytest.mark.parametrize("name", ["sqrt", "abs", "floor", "rint", "tanh", "sign", "isfinite", "negative", "square"])
-def test_functions_of_special_numbers(name: str) -> None:
+def test_functions_of_special_numbers(name):
     (found,) = compiled(lambda x: (getattr(np, name)(x),), SPECIAL)
     with np.errstate(all="ignore"):
         np.testing.assert_allclose(found, getattr(np, name)(SPECIAL), rtol=1e-15)
@@ -89,7 +84,7 @@ def test_functions_of_special_numbers(name: str) -> None:
     ["maximum", "minimum", "fmax", "fmin", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal",
      "add", "subtract", "multiply", "divide", "hypot"],
 )  # fmt: skip
-def test_functions_of_special_pairs(name: str) -> None:
+def test_functions_of_special_pairs(name):
     a, b = (grid.ravel() for grid in np.meshgrid(SPECIAL, SPECIAL))
     (found,) = compiled(lambda a, b: (getattr(np, name)(a, b),), a, b)
     with np.errstate(all="ignore"):
@@ -101,25 +96,25 @@ def test_functions_of_special_pairs(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["maximum", "minimum"])
-def test_the_larger_of_a_special_number_and_a_constant(name: str) -> None:
+def test_the_larger_of_a_special_number_and_a_constant(name):
     larger = getattr(np, name)
     found = compiled(lambda x: [larger(*pair) for c in SPECIAL for pair in ((x, c), (c, x))], SPECIAL)
     np.testing.assert_array_equal(found, [larger(SPECIAL, c) for c in SPECIAL for _ in range(2)])
 
 
-def test_angles_on_the_axes() -> None:
+def test_angles_on_the_axes():
     y, x = (grid.ravel() for grid in np.meshgrid(SPECIAL[np.isfinite(SPECIAL)], SPECIAL[np.isfinite(SPECIAL)]))
     (found,) = compiled(lambda y, x: (np.arctan2(y, x),), y, x)
     np.testing.assert_allclose(found, np.arctan2(y, x), rtol=1e-15)
     assert np.array_equal(np.signbit(found), np.signbit(np.arctan2(y, x)))
 
 
-def test_tables() -> None:
+def test_tables():
     rng = np.random.default_rng(5)
     rising, entries = np.sort(rng.normal(size=37)), rng.normal(size=38)
     x = np.concatenate([2 * rng.normal(size=500), rising, [-np.inf, np.inf]])
 
-    def looked_up(x: Any) -> Sequence[Any]:
+    def looked_up(x):
         place = np.searchsorted(rising, x)
         return place, np.searchsorted(rising, x, side="right"), functions.take(entries, place)
 
@@ -129,11 +124,11 @@ def test_tables() -> None:
     assert np.array_equal(taken, entries[np.searchsorted(rising, x)])
 
 
-def test_loops_within_loops() -> None:
+def test_loops_within_loops():
     """Square roots by Newton's method, each quotient by a loop of its own; what does not change stays outside."""
 
-    def roots(x: Any, y: Any) -> Sequence[Any]:
-        def halved(now: list[Any]) -> list[Any]:
+    def roots(x, y):
+        def halved(now):
             (inverse,) = looped(lambda z: [z[0] * (2.0 - now[0] * z[0])], [1.0 / (now[0] + 0.01 * np.sin(y))], 6)
             return [0.5 * (now[0] + np.sqrt(x) * np.sqrt(x) * inverse)]
 
@@ -145,7 +140,7 @@ def test_loops_within_loops() -> None:
 
 
 @pytest.mark.parametrize("width", [2, 4])
-def test_numbers_given_by_sample_by_position_and_by_both(width: int) -> None:
+def test_numbers_given_by_sample_by_position_and_by_both(width):
     """Each is computed where it differs, by vectors of any width, in parts that change no bit."""
     graph, rng = Graph(), np.random.default_rng(7)
     kinds = {"g": 0, "s": SAMPLE, "p": POSITION, "b": BOTH}
@@ -168,7 +163,7 @@ def test_numbers_given_by_sample_by_position_and_by_both(width: int) -> None:
 
 
 @pytest.mark.parametrize(("samples", "positions"), [(1, 1), (3, 2), (1, 3), (4, 5)])
-def test_rows_shorter_than_a_vector(samples: int, positions: int) -> None:
+def test_rows_shorter_than_a_vector(samples, positions):
     run = prepare(trunnion.read(DURANGO))
     path = run.system.mechanism.path_of("AB")
     lengths = run.values[path] * (1 + 1e-3 * np.arange(samples)[:, None])
@@ -179,7 +174,7 @@ def test_rows_shorter_than_a_vector(samples: int, positions: int) -> None:
     np.testing.assert_allclose(curves["effort"], run.solve(time, values).efforts["A"], rtol=1e-12)
 
 
-def test_angles_beyond_the_range_are_left_to_numpy() -> None:
+def test_angles_beyond_the_range_are_left_to_numpy():
     """After 10⁵ rad of the drive the sine of a compiled kernel is no number, and NumPy's is used."""
     run = prepare(trunnion.read(DURANGO))
     turns = run.cycle.times(8) + 20_000 * run.cycle.duration
@@ -192,7 +187,7 @@ def test_angles_beyond_the_range_are_left_to_numpy() -> None:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("seed", range(30, 50))
-def test_random_planar_mechanisms(seed: int) -> None:
+def test_random_planar_mechanisms(seed):
     """Efforts and reactions to 1e-9 of their peak, the same statuses."""
     found = compared("planar", seed)
     assert found.refused or found.agrees
@@ -201,16 +196,16 @@ def test_random_planar_mechanisms(seed: int) -> None:
 @pytest.mark.sample(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(30, 36))
-def test_random_spatial_mechanisms(seed: int) -> None:
+def test_random_spatial_mechanisms(seed):
     found = compared("spatial", seed)
     assert found.refused or found.agrees
 
 
-def kept(folder: Path) -> list[Path]:
+def kept(folder):
     return sorted((folder / "trunnion" / "compiled").glob("*"))
 
 
-def run_once() -> Any:
+def run_once():
     graph = Graph()
     x = Recorded(graph, graph.input("x", POSITION))
     code = machine_code.MachineCode(program(graph, [(x * 3.0).node], 4))
@@ -220,14 +215,14 @@ def run_once() -> Any:
     return code
 
 
-def test_code_is_kept_and_used_again(cache: Path) -> None:
+def test_code_is_kept_and_used_again(cache):
     assert run_once().compiled
     assert len(kept(cache)) == 1
     assert not run_once().compiled
 
 
 @pytest.mark.parametrize("damage", [b"", b"nothing", None])
-def test_damaged_code_is_replaced(cache: Path, damage: bytes | None) -> None:
+def test_damaged_code_is_replaced(cache, damage):
     run_once()
     (path,) = kept(cache)
     whole = path.read_bytes()
@@ -238,20 +233,20 @@ def test_damaged_code_is_replaced(cache: Path, damage: bytes | None) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="of POSIX")
 @pytest.mark.parametrize("open_", ["file", "folder"])
-def test_code_that_others_may_have_written_is_not_run(cache: Path, open_: str) -> None:
+def test_code_that_others_may_have_written_is_not_run(cache, open_):
     run_once()
     (path,) = kept(cache)
     (path if open_ == "file" else path.parent).chmod(0o777)
     assert run_once().compiled
 
 
-def test_a_folder_that_cannot_be_written(cache: Path) -> None:
+def test_a_folder_that_cannot_be_written(cache):
     (cache / "trunnion").write_text("a file where the folder should be")
     assert run_once().compiled
     assert run_once().compiled
 
 
-def test_a_loop_goes_on_while_any_lane_changes() -> None:
+def test_a_loop_goes_on_while_any_lane_changes():
     """Lanes of one vector that come to rest after different numbers of rounds, the first of them at once."""
     graph = Graph()
     x = Recorded(graph, graph.input("x", POSITION))
@@ -262,12 +257,12 @@ def test_a_loop_goes_on_while_any_lane_changes() -> None:
     assert found[0].tolist() == np.minimum(rounds, 50.0).tolist()
 
 
-def test_a_loop_ends_where_all_lanes_are_done() -> None:
+def test_a_loop_ends_where_all_lanes_are_done():
     """A step leaves lanes that are done; no round is made where all are; the same with and without values."""
     calls, needed = [], np.array([0.0, 3.0, 49.0, 7.0, 2.0, 60.0, 1.0, np.nan])
 
-    def counted(limit: Any) -> Any:
-        def step(state: list[Any]) -> list[Any]:
+    def counted(limit):
+        def step(state):
             calls.append(1)
             goes = state[0] < limit
             return [np.where(goes, state[0] + 1.0, state[0]), np.where(goes, state[0] - limit, state[1])]

@@ -2,8 +2,6 @@
 
 import copy
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +9,9 @@ from scipy.integrate import solve_ivp
 
 import trunnion
 from brief import brief
-from mechanisms import Array, Data, build, four_bar, positions_of, slider_crank
-from mechanisms_parts import joined, slide
-from trunnion import Mechanism, read
+from mechanisms import build, four_bar, positions_of, slider_crank
+from mechanisms_parts import example, joined, slide
+from trunnion import Mechanism
 from trunnion.results.tables.cycle import positions
 from trunnion.solve.bristles import _chained
 from trunnion.solve.friction_method import FrictionMethod
@@ -24,7 +22,7 @@ BY_DIRECTION = {"coefficient": FORWARD, "backward": BACKWARD}
 G = 9.81
 
 
-def with_friction(data: Data, joint: str, friction: Any) -> Mechanism:
+def with_friction(data, joint, friction):
     """The data with another friction of one joint."""
     changed = copy.deepcopy(data)
     changed["joints"][joint]["friction"] = friction
@@ -36,7 +34,7 @@ def with_friction(data: Data, joint: str, friction: Any) -> Mechanism:
     ("name", "joint", "engine"),
     [("durango-fourbar", "D", "numpy"), ("offset-slider-crank", "S", "compiled"), ("rssr", "D", "numpy")],
 )
-def test_each_way_is_a_run_with_its_coefficient(name: str, joint: str, engine: Any) -> None:
+def test_each_way_is_a_run_with_its_coefficient(name, joint, engine):
     """Forces, locking margin and losses are those of the coefficient of the direction at hand."""
     data = trunnion.read(f"examples/{name}.yaml").data()
     runs = [
@@ -54,7 +52,7 @@ def test_each_way_is_a_run_with_its_coefficient(name: str, joint: str, engine: A
     assert different > 1e-3 * np.abs(runs[0]["drive_effort"]).max()
 
 
-def test_at_rest_each_bound_has_its_own() -> None:
+def test_at_rest_each_bound_has_its_own():
     """A block of 2 kg that turns round: between −μ₋ m g and μ₊ m g."""
     data = block(0.0, BY_DIRECTION)
     data["drivers"] = {"S": {"law": "harmonic", "mean": 0.1, "amplitude": 0.1, "period": 1.0}}
@@ -65,7 +63,7 @@ def test_at_rest_each_bound_has_its_own() -> None:
     assert (low, high) == pytest.approx((-BACKWARD * 2 * G, FORWARD * 2 * G), rel=1e-9)
 
 
-def block(slope: float, friction: Any, joint: str = "S") -> Data:
+def block(slope, friction, joint="S"):
     """A block of 2 kg on a slope, rad, up along x; a long guide carries no moment."""
     point = {"points": {joint: slide(0, 0)}}
     return {
@@ -79,11 +77,11 @@ THROWN = {"S": (2.0, 0.1, 0.35), "R": (1.5, 0.2, 0.8)}  # speed, m/s, and both c
 
 
 @pytest.mark.parametrize("joints", ["S", "R", pytest.param("SR", marks=pytest.mark.slow)])
-def test_blocks_thrown_up_a_slope(joints: str) -> None:
+def test_blocks_thrown_up_a_slope(joints):
     """Up with μ₊ against it, down with μ₋, or it stays where tan of the slope is below μ₋: times and way by the closed
     form, of several blocks each for itself."""
     slope = np.radians(30)
-    data: Data = {**block(slope, None), "links": {"ground": {"points": {}}}, "joints": {}, "drivers": {}}
+    data = {**block(slope, None), "links": {"ground": {"points": {}}}, "joints": {}, "drivers": {}}
     for name in joints:
         speed, forward, backward = THROWN[name]
         alone = block(slope, {"coefficient": forward, "backward": backward}, name)
@@ -103,9 +101,9 @@ def test_blocks_thrown_up_a_slope(joints: str) -> None:
         assert found["joint_slide"].sel(joint=name).values == pytest.approx(way, abs=1e-7), name
 
 
-def test_a_loaded_roller() -> None:
+def test_a_loaded_roller():
     """Torque arm · W of a wheel under the weight W, which needs no radius of a pin."""
-    wheel: Data = {
+    wheel = {
         "gravity": [0, -G],
         "links": {"ground": {"points": {"A": [0, 0]}}, "wheel": {"points": {"A": [0, 0]}, "mass": 50.0}},
         "joints": joined("ground -A- wheel", A={"friction": {"law": "rolling", "arm": 5e-4}}),
@@ -116,12 +114,12 @@ def test_a_loaded_roller() -> None:
 
 
 @pytest.mark.slow
-def test_tolerances_know_the_backward_coefficient() -> None:
+def test_tolerances_know_the_backward_coefficient():
     """Its exact sensitivity against a central difference."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()
     data["measures"] = {"least": {"effort": "A", "as": "minimum"}}
 
-    def least(backward: float, **more: Any) -> Mechanism:
+    def least(backward, **more):
         return with_friction({**data, **more}, "D", {"coefficient": 0.1, "backward": backward})
 
     tolerances = {"joints.D.friction.backward": 0.05}
@@ -131,7 +129,6 @@ def test_tolerances_know_the_backward_coefficient() -> None:
     assert abs(found) > 1
 
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PEZZUTI = {"joint_defaults.friction.model": "pezzuti"}
 FINE = 2001  # shares of one contact
 CASES = {
@@ -147,7 +144,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
     name, values, joint, inside = CASES[case]
-    mechanism = read(EXAMPLES / f"{name}.yaml").with_values(values)
+    mechanism = example(name).with_values(values)
     result, run = brief(mechanism, 72), prepare(mechanism)
     lower, own, upper = (result[f"drive_effort{end}"].values for end in ("_lower", "", "_upper"))
     driver = int(np.argmax(np.nanmax(upper - lower, axis=1))) if joint != "F" else 1
@@ -173,7 +170,7 @@ def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
     assert (max(beyond) > 1e-4) == inside
 
 
-def test_a_guide_in_the_plane() -> None:
+def test_a_guide_in_the_plane():
     """A slider 0.5 m long that carries 100 N, 0.6 m beyond its middle: 100 N·(0.6/0.5 + 1/2) on the nearer end."""
     data = {**block(0.0, 0.0), "gravity": [0, 0], "drivers": {"S": {"speed": 1.0, "range": [0, 0.2]}}}
     data["links"]["block"]["points"]["E"] = [0.6, 0]
@@ -183,7 +180,7 @@ def test_a_guide_in_the_plane() -> None:
 
 
 @pytest.mark.slow
-def test_a_bearing_in_space_by_its_reaction() -> None:
+def test_a_bearing_in_space_by_its_reaction():
     """|F⊥/2 ∓ M⊥ × u/L|, of the force and moment in the table of the result."""
     model = trunnion.read("examples/rssr.yaml").data()
     model["measures"] = {"end": {"end_load": "D"}}
@@ -196,12 +193,12 @@ def test_a_bearing_in_space_by_its_reaction() -> None:
     assert found.measure_value.sel(measure="end").values == pytest.approx(np.max(sizes, axis=0), rel=1e-12)
 
 
-def sizes(found: Any, joint: str) -> Any:
+def sizes(found, joint):
     """The load on every end of a joint, (end, position), N."""
     return np.linalg.norm(found["end_load"].sel(joint=joint), axis=1)
 
 
-def test_the_table_has_both_ends_and_the_pressure() -> None:
+def test_the_table_has_both_ends_and_the_pressure():
     """A mass 0.3 m beyond the middle of a bearing of 0.1 m: m g (1/2 ± a/L); the end that bears more, over half of the
     projected area, is the pressure."""
     axis = {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}}
@@ -221,7 +218,7 @@ def test_the_table_has_both_ends_and_the_pressure() -> None:
     assert summary["A.pin_pressure_max"]["value"] == pytest.approx(both[0] / (0.02 * 0.05), rel=1e-12)
 
 
-def test_the_pressure_of_a_pin_in_the_plane() -> None:
+def test_the_pressure_of_a_pin_in_the_plane():
     """F/(d b) of the reaction; of pins whose length is not stated there is none."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()
     data["joints"]["C"]["pin"] = {"radius": "0.1 m", "length": "50 mm"}
@@ -234,7 +231,7 @@ def test_the_pressure_of_a_pin_in_the_plane() -> None:
     assert not any(name.startswith(("B.pin", "C.end")) for name in columns)
 
 
-def pins_of_the_first_cross(found: Any) -> tuple[Any, Any]:
+def pins_of_the_first_cross(found):
     """Directions of the two pins of joint B of the double Cardan shaft, (axis, position), by its geometry."""
     turn = found["joint_rotation"].sel(joint="A").values
     first = np.array([-np.sin(turn), np.cos(turn), 0 * turn])
@@ -242,7 +239,7 @@ def pins_of_the_first_cross(found: Any) -> tuple[Any, Any]:
     return first, second / np.linalg.norm(second, axis=0)
 
 
-def test_a_massless_cross_by_its_normal() -> None:
+def test_a_massless_cross_by_its_normal():
     """Without mass and friction it passes on M along its normal n; the input has T = M n·e, each end M/L."""
     data = trunnion.read("examples/double-cardan.yaml").data()
     data.pop("gravity")
@@ -257,7 +254,7 @@ def test_a_massless_cross_by_its_normal() -> None:
 
 
 @pytest.mark.slow
-def test_friction_of_a_cross_counts_these_loads() -> None:
+def test_friction_of_a_cross_counts_these_loads():
     """μ r Σ|Q| ω of each pin: the friction of one bears on the other."""
     found = trunnion.analyse(trunnion.read("examples/double-cardan.yaml"), steps=40, engine="numpy")
     spin = [found["link_angular_velocity"].sel(link=link).values for link in ("input", "middle")]
@@ -271,7 +268,7 @@ def test_friction_of_a_cross_counts_these_loads() -> None:
 @pytest.mark.parametrize(
     ("name", "joint", "engine"), [("double-cardan", "A", "numpy"), ("offset-slider-crank", "S", "compiled")]
 )
-def test_friction_counts_these_loads(name: str, joint: str, engine: Any) -> None:
+def test_friction_counts_these_loads(name, joint, engine):
     """μ r Σ|Q| ω of a bearing, μ Σ|Q| v of a guide."""
     model = trunnion.read(f"examples/{name}.yaml")
     found, numbers = trunnion.analyse(model, steps=40, engine=engine), model.parameters()
@@ -290,7 +287,7 @@ LUGRE = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("data", "joint", "law"), [(four_bar(), "D", DAHL), (slider_crank(), "P", LUGRE)])
-def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, Any]) -> None:
+def test_state_against_a_stiff_integrator(data, joint, law):
     """In a rocker's pin and a slider's guide, both of which turn back twice a turn, once the start is forgotten."""
     run = prepare(build(data, friction=law))
     duration, lever = run.cycle.duration, run.values.get(f"joints.{joint}.pin.radius", 1.0)
@@ -298,7 +295,7 @@ def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, 
     speeds = np.ravel(lever * run.solve(fine).walk.speed(joint))
     peak = law.get("static", law["coefficient"]) - law["coefficient"]
 
-    def rate(time: float, z: Array) -> list[float]:
+    def rate(time, z):
         v = float(np.interp(time % duration, fine, speeds))
         curve = law["coefficient"] + peak * np.exp(-((v / law.get("stribeck_speed", 1.0)) ** 2))
         return [v - law["stiffness"] * abs(v) / curve * z[0]]
@@ -310,7 +307,7 @@ def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, 
     np.testing.assert_allclose(run._past[joint].at(time), expected, rtol=0, atol=2e-4 * np.abs(expected).max())
 
 
-def test_state_is_periodic_and_settled_whatever_the_steps() -> None:
+def test_state_is_periodic_and_settled_whatever_the_steps():
     run = prepare(build(four_bar(), friction=LUGRE))
     history, duration = run._past["D"], run.cycle.duration
     time = np.linspace(0, 1, 37) * duration
@@ -319,7 +316,7 @@ def test_state_is_periodic_and_settled_whatever_the_steps() -> None:
     np.testing.assert_allclose(many["drive_effort"].values[:, ::2], few["drive_effort"].values, rtol=1e-12)
 
 
-def test_dahl_from_rest() -> None:
+def test_dahl_from_rest():
     """Over a range the bristles start at rest: F = f N (1 − exp(−κ x/f)), exactly."""
     data = {**block(0.0, DAHL), "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}}}
     result = brief(Mechanism(**data), 41)
@@ -327,7 +324,7 @@ def test_dahl_from_rest() -> None:
     np.testing.assert_allclose(-result["friction_force"].sel(joint="S").values, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_lugre_slides_steadily_by_stribecks_curve() -> None:
+def test_lugre_slides_steadily_by_stribecks_curve():
     """A fast drive leaves no trace of the bristles between reversals: the pin A always turns one way."""
     steady = {key: number for key, number in LUGRE.items() if key not in ("stiffness", "damping")} | {"law": "stribeck"}
     bristles, curve = positions_of(four_bar(), 24, friction=LUGRE), positions_of(four_bar(), 24, friction=steady)
@@ -338,7 +335,7 @@ def test_lugre_slides_steadily_by_stribecks_curve() -> None:
     np.testing.assert_allclose(*ratios, rtol=1e-3)
 
 
-def test_maps_of_intervals_are_chained_and_closed() -> None:
+def test_maps_of_intervals_are_chained_and_closed():
     """z ↦ z/2 + 1, then z ↦ 0.8 z + 2: over both z ↦ 0.4 z + 2.8, which comes back to z₀ = 2.8/0.6; from rest 0."""
     keep, gain = np.array([0.5, 0.8]), np.array([1.0, 2.0])
     start = 2.8 / 0.6

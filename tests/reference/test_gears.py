@@ -1,23 +1,13 @@
 """Gear pairs, racks, chains and screws against geometry, virtual work, statics by hand and the textbook's screw."""
 
 import copy
-from typing import Any
 
 import numpy as np
 import pytest
 
 import trunnion
 from brief import brief, judged
-from mechanisms import (
-    Data,
-    analyse,
-    geared_five_bar,
-    geared_loop,
-    planet_drive,
-    positions_of,
-    rocker_train,
-    screwed_strut,
-)
+from mechanisms import analyse, geared_five_bar, geared_loop, planet_drive, positions_of, rocker_train, screwed_strut
 from mechanisms_parts import corner, joined, slide
 from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare
@@ -25,7 +15,7 @@ from trunnion.solve.run import prepare
 TOOTHED = {"five-bar": geared_five_bar, "planet": planet_drive, "loop": geared_loop}
 
 
-def test_two_wheels() -> None:
+def test_two_wheels():
     """A train of two wheels on the ground: torque by the ratio, tooth force 1/cos α of torque by radius."""
     angle, torque = np.radians(25.0), 30.0
     data = {
@@ -39,7 +29,7 @@ def test_two_wheels() -> None:
         "drivers": {"A": {"speed": 10.0}},
         "loads": {"brake": {"joint": "E", "resisting_torque": torque}},
     }
-    result = brief(Mechanism(**data), 8)  # type: ignore[arg-type]
+    result = brief(Mechanism(**data), 8)
     assert result["time"].values[-1] == pytest.approx(2 * 2 * np.pi / 10 * 7 / 8)  # two turns of the pinion
     np.testing.assert_allclose(result["drive_effort"].sel(driver="A"), torque / 2, rtol=1e-12)
     tangential, apart = torque / 0.2, torque / 0.2 * np.tan(angle)
@@ -53,7 +43,7 @@ def test_two_wheels() -> None:
 
 
 @pytest.mark.parametrize("name", TOOTHED)
-def test_teeth_change_reactions_only(name: str) -> None:
+def test_teeth_change_reactions_only(name):
     """A train of the same ratio asks for the same drive torque: teeth do no work."""
     other = copy.deepcopy(TOOTHED[name]())
     for gear in other["gears"].values():
@@ -65,7 +55,7 @@ def test_teeth_change_reactions_only(name: str) -> None:
     assert np.abs(train["reaction_force"] - toothed["reaction_force"]).max() > 1.0
 
 
-def test_ratio_is_kept_over_all_turns() -> None:
+def test_ratio_is_kept_over_all_turns():
     result = analyse(geared_five_bar(), 200)
     rotation = result["joint_rotation"]
     slip = rotation.sel(joint="E") - 0.5 * rotation.sel(joint="A") - 0.4
@@ -78,10 +68,10 @@ def test_ratio_is_kept_over_all_turns() -> None:
     assert train["time"].values[-1] == pytest.approx(2 * np.pi / 5 * 89 / 90)  # the rocker makes no whole turn
 
 
-def test_cycle_of_a_chain_of_gear_pairs() -> None:
+def test_cycle_of_a_chain_of_gear_pairs():
     """½ · ½ · ½ of a turn: eight turns of the driver, with the pairs stated in any direction."""
     names = "ABCD"
-    data: Data = {
+    data = {
         "links": {
             "ground": {"points": {name: [0.3 * i, 0.0] for i, name in enumerate(names)}},
             **{f"g{i}": {"points": {name: [0, 0]}, "mass": 1.0} for i, name in enumerate(names)},
@@ -103,7 +93,7 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
 RADIUS, TORQUE = 0.008, 80.0
 
 
-def steering(driver: Data, gear: Data | None = None) -> Data:
+def steering(driver, gear=None):
     """Half of a rack steering: the tie rod turns a knuckle against a torque. The rack lies below the pinion."""
     return {
         "gravity": [0, 0],
@@ -122,18 +112,18 @@ def steering(driver: Data, gear: Data | None = None) -> Data:
     }
 
 
-def at(result: Any, variable: str, axis: str | None = None, **where: str) -> Any:
+def at(result, variable, axis=None, **where):
     return result[variable].sel(**where, **({"axis": axis} if axis else {})).values
 
 
-def knuckle_by_hand(rack: Any) -> Any:
+def knuckle_by_hand(rack):
     """Angle of the knuckle for a place of the rack: circles about T and K meet in A, on the lower side."""
     a = corner(0.3 + np.asarray(rack), 0.6 + 0.15j, 0.285, np.hypot(0.02, 0.14), -1)
     return np.angle((a - (0.6 + 0.15j)) / (-0.02 - 0.14j))
 
 
 @pytest.mark.parametrize(("order", "angle"), [(("P", "S"), 20.0), (("S", "P"), 14.5)])
-def test_rack_steering(order: tuple[str, str], angle: float) -> None:
+def test_rack_steering(order, angle):
     """Torque · ω = tyre torque · ω of the knuckle, by differences of the geometry; all forces are right."""
     gear = {"joints": list(order), "pressure_angle": np.radians(angle), "phase": 0.001}
     data = steering({"P": {"speed": 2.0, "range": [-5.0, 5.0]}}, gear)
@@ -148,7 +138,7 @@ def test_rack_steering(order: tuple[str, str], angle: float) -> None:
     judged(data, result)
 
 
-def wheel_and_rack(driver: Data) -> Data:
+def wheel_and_rack(driver):
     data = steering(driver)
     data["loads"] = {"wind": {"joint": "P", "resisting_torque": 3.0}}
     data["links"] = {name: data["links"][name] for name in ("ground", "pinion", "rack")}
@@ -158,7 +148,7 @@ def wheel_and_rack(driver: Data) -> Data:
     return data
 
 
-def test_driven_rack_turns_the_pinion() -> None:
+def test_driven_rack_turns_the_pinion():
     """The pair the other way round: the rack drives, a torque on the pinion asks for T/r on the rack."""
     result = brief(Mechanism(**wheel_and_rack({"S": {"speed": 0.02, "range": [-0.1, 0.1]}})), 9)
     np.testing.assert_allclose(at(result, "drive_effort", driver="S"), 3.0 / RADIUS, rtol=1e-12)
@@ -171,7 +161,7 @@ def test_driven_rack_turns_the_pinion() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("joint", "ends"), [("P", (0.0, 1000.0)), ("S", (-900.0, -1000.0))])
-def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
+def test_many_turns_away(joint, ends):
     """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""
     rotation = 2 * np.pi * np.linspace(*ends, 90)
     coordinate = rotation if joint == "P" else RADIUS * rotation
@@ -182,7 +172,7 @@ def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
     np.testing.assert_allclose(np.exp(1j * off), 1.0, atol=1e-9)
 
 
-def hoist(**wheel: Any) -> Data:
+def hoist(**wheel):
     return {
         "gravity": [0, -9.81],
         "links": {
@@ -196,7 +186,7 @@ def hoist(**wheel: Any) -> Data:
     }
 
 
-def test_chain_hoist() -> None:
+def test_chain_hoist():
     """m g r at the wheel, m g in its bearing and nothing at the guide; friction of the bearing adds f r_pin m g."""
     weight = 100.0 * 9.81
     result = brief(Mechanism(**hoist()), 5)
@@ -209,7 +199,7 @@ def test_chain_hoist() -> None:
     assert float(rough["efficiency"]) == pytest.approx(0.06 / 0.061, rel=1e-12)
 
 
-def test_a_falling_load_turns_its_wheel() -> None:
+def test_a_falling_load_turns_its_wheel():
     """s̈ = g m r²/(m r² + J), the wheel's motion free."""
     data = hoist()
     data["drivers"]["A"] = {"speed": 1.0, "free": True, "range": [-60.0, 5.0], "initial": {"coordinate": 0, "speed": 0}}
@@ -222,7 +212,7 @@ def test_a_falling_load_turns_its_wheel() -> None:
 MEAN = 0.006  # radius of the thread, m
 
 
-def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Data:
+def press(friction, driver, lead=0.02, **more):
     """A nut on a guide, whose screw turns in the frame."""
     return {
         "gravity": [0, 0],
@@ -239,7 +229,7 @@ def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Dat
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.6])
-def test_driven_at_the_nut(friction: float) -> None:
+def test_driven_at_the_nut(friction):
     """F r tan(λ − φ) turns the screw; from φ = λ on it locks, at tan λ/f of the friction."""
     slope = np.arctan(0.02 / (2 * np.pi * MEAN))
     driver, brake = {"S": {"speed": 0.01, "range": [0.0, 0.1]}}, {"b": {"joint": "W", "resisting_torque": 1.0}}
@@ -254,7 +244,7 @@ def test_driven_at_the_nut(friction: float) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("friction", "torque"), [(0.05, 0.0), (0.05, 1.5), (0.6, 0.4)])
-def test_a_free_screw(friction: float, torque: float) -> None:
+def test_a_free_screw(friction, torque):
     """(J + m p r tan(λ ± φ)) ω̇ = T − F r tan(λ ± φ), p = lead/2π; at rest between the two torques."""
     p, force, phi = 0.02 / (2 * np.pi), 100.0, np.arctan(friction)
     slope = np.arctan(p / MEAN)
@@ -271,7 +261,7 @@ def test_a_free_screw(friction: float, torque: float) -> None:
     np.testing.assert_allclose(at(result, "drive_coordinate", driver="W"), expected, rtol=1e-9, atol=1e-12)
 
 
-def test_a_screw_is_a_driven_slide() -> None:
+def test_a_screw_is_a_driven_slide():
     """Without friction the strut bears the same forces where its slide is driven as the screw moves it."""
     rate = 0.006 / (2 * np.pi)
     turned, plain = screwed_strut(), screwed_strut()
@@ -287,7 +277,7 @@ def test_a_screw_is_a_driven_slide() -> None:
     np.testing.assert_allclose(torque, force * rate, rtol=1e-9)
 
 
-def test_a_turn_of_a_screw_is_no_cycle_that_comes_back() -> None:
+def test_a_turn_of_a_screw_is_no_cycle_that_comes_back():
     """The nut rises by one pitch, and the work of the drive lifts it."""
     pitch, mass, axis = 0.006, 400.0, {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
     nut = {"points": {"H": axis}, "mass": mass, "centre": [0, 0, 0], "inertia": dict.fromkeys(("xx", "yy", "zz"), 1.0)}

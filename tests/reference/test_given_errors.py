@@ -1,29 +1,15 @@
 """Seats that are given, misaligned axes and dimensions off nominal against models changed by hand."""
 
 import copy
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
 from mechanisms import MODELS, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
 from mechanisms_space import Drawn, rssr
-from reference.maximal_space import (
-    Array,
-    Data,
-    Drive,
-    Frame,
-    Linkage,
-    Motion,
-    element,
-    point,
-    pose_of,
-    published,
-    rotation,
-)
+from reference.maximal_space import Drive, Frame, Linkage, element, point, pose_of, published, rotation
 from reference.seat_oracle import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.solve.run import prepare
@@ -32,7 +18,7 @@ START, RHO, LENGTH, OFFSET = 0.1, 3e-5, 0.025, 0.004
 RADIUS = 0.005
 
 
-def linkage(**joint: Any) -> Data:
+def linkage(**joint):
     """The RSSR with something stated of its output bearing, which lies off its point along the axis."""
     data = copy.deepcopy(rssr(start=START).data)
     data["assembly"] = {"D": 1.3}
@@ -41,11 +27,11 @@ def linkage(**joint: Any) -> Data:
     return data
 
 
-def analysed(data: Data, steps: int = 24) -> xr.Dataset:
+def analysed(data, steps=24):
     return trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), steps=steps)
 
 
-def by_hand(data: Data, shift: Frame) -> Data:
+def by_hand(data, shift):
     """The model whose output bearing is moved in the rocker, about the middle of the bearing."""
     middle = Frame(np.array([0.0, 0.0, OFFSET]), np.eye(3))
     links = copy.deepcopy(data["links"])
@@ -54,16 +40,16 @@ def by_hand(data: Data, shift: Frame) -> Data:
     return {**data, "links": links}
 
 
-def motions(data: Data, result: xr.Dataset, i: int) -> dict[str, Motion]:
+def motions(data, result, i):
     """Motion at one position by another program, from near where Trunnion has it."""
     home = {link: published(result, link, i) for link in ("crank", "rod", "rocker")}
     turned = float(result.joint_rotation.sel(joint="A").values[i])
     return Linkage(data).move(home, {"A": Drive(turned, 30.0)})
 
 
-def agrees(result: xr.Dataset, data: Data) -> dict[str, Motion]:
+def agrees(result, data):
     """Crank and rocker of a result against a model, at a few positions; returns the last motions."""
-    found: dict[str, Motion] = {}
+    found = {}
     for i in (0, 7, 15, 23):
         found = motions(data, result, i)
         for link in ("crank", "rocker"):
@@ -73,7 +59,7 @@ def agrees(result: xr.Dataset, data: Data) -> dict[str, Motion]:
     return found
 
 
-def leaned(across: Array, place: Array) -> Frame:
+def leaned(across, place):
     """z turned towards (across, 1) by the shortest way, moved."""
     size = float(np.hypot(*across))
     turn = rotation([-across[1], across[0], 0.0], float(np.arctan(size))) if size else np.eye(3)
@@ -84,7 +70,7 @@ def leaned(across: Array, place: Array) -> Frame:
 @pytest.mark.parametrize(
     "degrees", [(0.0, 0.0), (0.0, 40.0), (180.0, 0.0), (180.0, -70.0), (95.0, 150.0), (-60.0, 10.0)]
 )
-def test_given_seat(degrees: tuple[float, float]) -> None:
+def test_given_seat(degrees):
     """β and ξ as stated: place and lean of the bearing, its ends, where they touch the wall of the hole, ξ of [P]."""
     beta, xi = np.radians(degrees)
     data = linkage(seat={"beta": float(beta), "xi": float(xi)})
@@ -117,7 +103,7 @@ def test_given_seat(degrees: tuple[float, float]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("aside", [None, 1.9])
-def test_misaligned_axis(aside: float | None) -> None:
+def test_misaligned_axis(aside):
     """Leaned by `tilt` towards `towards`, moved along `offset_towards`; beside the ideal one."""
     tilt, towards, offset = np.radians(0.4), 0.7, 2e-4
     stated = {"tilt": float(tilt), "towards": towards, "offset": offset}
@@ -139,7 +125,7 @@ def test_misaligned_axis(aside: float | None) -> None:
     np.testing.assert_allclose(result.reaction_force_change.values, force.values, rtol=0, atol=1e-9)
 
 
-def test_dimensions_off_nominal() -> None:
+def test_dimensions_off_nominal():
     """A point and a start angle off by `errors`: the model with those numbers, and the difference to that without."""
     data = copy.deepcopy(model(four_bar(), friction=0.1))
     data["errors"] = {"links.rocker.points.C.x": 1e-3, "links.coupler.points.C.y": -2e-3}
@@ -159,7 +145,7 @@ def test_dimensions_off_nominal() -> None:
 NOW = np.array([0.0])
 
 
-def offsets_for(space: str, data: Data, size: float, seed: int) -> dict[str, float]:
+def offsets_for(space, data, size, seed):
     """Random offsets of every joint that has a model of its play."""
     rng, found = np.random.default_rng(seed), {}
     for name, joint in data["joints"].items():
@@ -171,7 +157,7 @@ def offsets_for(space: str, data: Data, size: float, seed: int) -> dict[str, flo
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("name", SPACE_MODELS)
-def test_mechanisms_in_space_with_offsets_in_every_joint(name: str) -> None:
+def test_mechanisms_in_space_with_offsets_in_every_joint(name):
     """Frames of all links against maximal coordinates, to 1e-10: offsets up to 1 mm, bearings off their points."""
     drawn = SPACE_MODELS[name]()
     assert isinstance(drawn, Drawn)
@@ -190,7 +176,7 @@ def test_mechanisms_in_space_with_offsets_in_every_joint(name: str) -> None:
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
 
 
-def moved_planar(data: Data, seats: dict[str, float], guide: float) -> Data:
+def moved_planar(data, seats, guide):
     """The planar model with second elements moved as the offsets say; loads stay where they are."""
     links = {name: {**link, "points": dict(link["points"])} for name, link in data["links"].items()}
     loads = {name: dict(load) for name, load in data.get("loads", {}).items()}
@@ -216,7 +202,7 @@ def moved_planar(data: Data, seats: dict[str, float], guide: float) -> Data:
 
 @pytest.mark.spread(12)
 @pytest.mark.parametrize("name", MODELS)
-def test_planar_mechanisms_with_offsets_in_every_joint(name: str) -> None:
+def test_planar_mechanisms_with_offsets_in_every_joint(name):
     """Seats as values and a model with its points moved are one mechanism: poses, forces and drives to 1e-9."""
     data, guide = model(MODELS[name](), friction=0.1), 0.4
     seats = offsets_for("planar", data, 1e-3, seed=5)

@@ -2,13 +2,10 @@
 
 import itertools
 import json
-from collections.abc import Callable, Sequence
-from typing import Any
 
 import clarabel
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.sparse import csc_matrix
 
@@ -18,33 +15,30 @@ from trunnion.dynamics.simulate import simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import summary_of
 
-Array = NDArray[np.float64]
 G = 9.81
 AXIS = {"at": [0, 0], "axis": [1, 0]}
 
 
-def events(data: Any) -> list[tuple[str, str, float, float | None]]:
+def events(data):
     """Kind, joint, time, s, and figure of all events."""
     rows = json.loads(data.attrs["events"])
     return [(kind, of, float(time), figure)
             for (kind, of, figure, *_), time in zip(rows, data.event_time.values, strict=True)]  # fmt: skip
 
 
-def findings(data: Any) -> dict[str, dict[str, Any]]:
+def findings(data):
     return {one["code"]: one["figures"] for one in json.loads(data.attrs["findings"])}
 
 
 # ---- blocks on each other -------------------------------------------------------------------------------------
 
 
-def stack(
-    masses: Sequence[float], rough: Sequence[float], speeds: Sequence[float], guide: float = 1e3, **more: Any
-) -> Mechanism:
+def stack(masses, rough, speeds, guide=1e3, **more):
     """Blocks a, b … on each other, each free to slide on the one below, in a guide so long that it never tilts."""
     names = "ABCD"[: len(masses)]
     bodies = ["ground", *names.lower()]
-    points: list[dict[str, Any]] = [dict.fromkeys(names[max(k - 1, 0) : k + 1], AXIS) for k in range(len(bodies))]
-    data: dict[str, Any] = {
+    points = [dict.fromkeys(names[max(k - 1, 0) : k + 1], AXIS) for k in range(len(bodies))]
+    data = {
         "links": {body: {"points": points[k], **({"mass": masses[k - 1]} if k else {})}
                   for k, body in enumerate(bodies)},
         "joints": {name: {"type": "prismatic", "links": bodies[k : k + 2], "friction": rough[k],
@@ -59,9 +53,7 @@ LOW, ARM, GUIDE, F = 2.0, 0.3, 0.2, 0.5
 JAM = 2 * F * ARM / GUIDE  # friction per inertia of what slides with its mass centre beside the guide: above 1
 
 
-def jamming(
-    force: str, upper: float = 0.0, gravity: float = 0.0, above: float = -1.0, alone: bool = False
-) -> Mechanism:
+def jamming(force, upper=0.0, gravity=0.0, above=-1.0, alone=False):
     """A slider with its mass centre beside its guide, pushed along it, and a block that slides on it, if not alone."""
     count = 1 if alone else 2
     data = stack((LOW, 1.0)[:count], (F, upper)[:count], (1.0, above)[:count], gravity=[0, -gravity],
@@ -72,7 +64,7 @@ def jamming(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("alone", [False, True])
-def test_a_slider_jams_where_its_push_turns_round(alone: bool) -> None:
+def test_a_slider_jams_where_its_push_turns_round(alone):
     """m q̈ + κ m |q̈| = T with κ > 1: pushed ahead q̈ = T/(m (1 + κ)); braked there is no q̈, and it stops at once; then
     it is pushed back. A block on it, without friction, keeps its momentum: it stands still in space all the time."""
     data = simulate(jamming("1 N - time/(1 s)*2 N", alone=alone), 1.0, 8)
@@ -93,7 +85,7 @@ def test_a_slider_jams_where_its_push_turns_round(alone: bool) -> None:
 
 
 @pytest.mark.slow
-def test_what_sticks_to_a_slider_that_jams_is_torn_away() -> None:
+def test_what_sticks_to_a_slider_that_jams_is_torn_away():
     """Braked by more than its friction at low accelerations, the slider has no acceleration, and jams; the block that
     stuck to it slides on with the speed that it had, and with its own friction."""
     data = simulate(jamming("-200 N", 0.2, G, 0.0), 0.05, 10)
@@ -109,21 +101,21 @@ LOWER, UPPER, STIFF = 2.0, 1.0, 60.0
 LIMITS = np.array([0.05 * (LOWER + UPPER) * G, 0.3 * UPPER * G])  # N
 
 
-def stick_and_slip(state: Array, end: float) -> tuple[Array, list[tuple[str, str, float]]]:
+def stick_and_slip(state, end):
     """The state of two blocks, the lower one on a spring, at the end, and the events, by equations of their own.
 
     M q̈ + K q = −friction of the joints, which is ± its limit where they slide (mode ±1) or what keeps them still (0).
     """
     mass = np.array([[LOWER + UPPER, UPPER], [UPPER, UPPER]])
 
-    def solved(y: Array, modes: Sequence[int]) -> tuple[Array, Array]:
+    def solved(y, modes):
         """Accelerations and friction of both joints."""
         sticks = np.diag([float(mode == 0) for mode in modes])
         matrix = np.block([[mass, np.eye(2)], [sticks, np.eye(2) - sticks]])
         answer = np.linalg.solve(matrix, [-STIFF * y[0], 0.0, *(np.array(modes) * LIMITS)])
         return answer[:2], answer[2:]
 
-    def consistent(y: Array, modes: Sequence[int], crossed: int | None) -> tuple[int, ...]:
+    def consistent(y, modes, crossed):
         """The first case of sticking and sliding that friction and accelerations allow; one that was left is none."""
         choices = [(0, 1, -1) if abs(rate) < 1e-7 or k == crossed else (int(np.sign(rate)),)
                    for k, rate in enumerate(y[2:])]  # fmt: skip
@@ -135,13 +127,13 @@ def stick_and_slip(state: Array, end: float) -> tuple[Array, list[tuple[str, str
                 return case
         raise AssertionError("no case is consistent")
 
-    def watched(k: int, modes: Sequence[int]) -> Callable[[float, Array], float]:
+    def watched(k, modes):
         """What stays above 0 until the k-th joint does something else."""
 
-        def left(_: float, y: Array) -> float:
+        def left(_, y):
             return 1e-11 + float(modes[k] * y[2 + k] if modes[k] else LIMITS[k] - abs(solved(y, modes)[1][k]))
 
-        left.terminal, left.direction = True, -1.0  # type: ignore[attr-defined]
+        left.terminal, left.direction = True, -1.0
         return left
 
     time, modes, changes = 0.0, consistent(state, (0, 0), None), list[tuple[str, str, float]]()
@@ -159,7 +151,7 @@ def stick_and_slip(state: Array, end: float) -> tuple[Array, list[tuple[str, str
         changes += [("stick" if before[k] else "break-away", "AB"[k], time) for k in changed]
 
 
-def test_blocks_stick_and_slip_as_their_equations_say() -> None:
+def test_blocks_stick_and_slip_as_their_equations_say():
     """The lower one is held by a spring, the upper one by friction alone."""
     model = stack(
         (LOWER, UPPER), (0.05, 0.3), (0, 0), springs={"k": {"joint": "A", "stiffness": STIFF, "free_length": 0}}
@@ -178,7 +170,7 @@ def test_blocks_stick_and_slip_as_their_equations_say() -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("seed", range(2))
-def test_a_stack_at_rest_accelerates_so_that_gauss_constraint_is_least(seed: int) -> None:
+def test_a_stack_at_rest_accelerates_so_that_gauss_constraint_is_least(seed):
     """Four stacked on each other, each pushed: of all accelerations that with the least ½ aᵀMa − Fᵀa + Σ μ N |Δa|, a
     convex function whose minimum is found by clarabel, apart from this code."""
     random = np.random.default_rng(seed)
@@ -208,7 +200,7 @@ AROUND = ROD * HALF**2 * 4 / 3
 ANGLE = np.pi / 3
 
 
-def rod(torque: float, friction: float = 0.0, rough: float = ROUGH) -> Mechanism:
+def rod(torque, friction=0.0, rough=ROUGH):
     """A rod hinged to a light slider in a rough guide; a moment turns it."""
     return Mechanism(
         gravity=[0, -G],
@@ -230,7 +222,7 @@ def rod(torque: float, friction: float = 0.0, rough: float = ROUGH) -> Mechanism
     )
 
 
-def solutions(torque: float, rough: float) -> int:
+def solutions(torque, rough):
     """How many accelerations Newton's laws have at the start, with the guide pushing up or down (P. Painlevé, 1895)."""
     count, sine, cosine = 0, np.sin(ANGLE), np.cos(ANGLE)
     for side in (1.0, -1.0):
@@ -246,7 +238,7 @@ def solutions(torque: float, rough: float) -> int:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_painleves_rod_stops_by_the_momentum_about_its_pin(friction: float) -> None:
+def test_painleves_rod_stops_by_the_momentum_about_its_pin(friction):
     """No acceleration: the slider stops at once. Of J Δω − m a sin φ Δv = ∓ f r |S|, S the impulse on the rod's end,
     follows ω; without friction in the pin it is Müller's condition."""
     assert solutions(-10.0, ROUGH) == 0
@@ -265,7 +257,7 @@ def test_painleves_rod_stops_by_the_momentum_about_its_pin(friction: float) -> N
 
 
 @pytest.mark.parametrize(("torque", "rough", "known"), [(0.0, ROUGH, 2), (0.0, 1.0, 1), (-10.0, 1.0, 1)])
-def test_several_accelerations_are_told(torque: float, rough: float, known: int) -> None:
+def test_several_accelerations_are_told(torque, rough, known):
     assert solutions(torque, rough) == known
     found = findings(simulate(rod(torque, rough=rough), 1e-4, 1))
     assert ("simulate.several_accelerations" in found) == (known > 1)
@@ -275,13 +267,13 @@ def test_several_accelerations_are_told(torque: float, rough: float, known: int)
 # ---- rest -----------------------------------------------------------------------------------------------------
 
 
-def wheels(motor: dict[str, Any] | None = None, speed: float = 3.0) -> Mechanism:
+def wheels(motor=None, speed=3.0):
     """Two wheels beside each other, each with its drag."""
     data = beside(wheel(motor, drag=0.6, initial={"speed": 2 * speed}), speed).data()
     return Mechanism(**{**data, "loads": {**data["loads"], "seal": {"joint": "W", "resisting_torque": 0.6}}})
 
 
-def test_all_free_drivers_come_to_rest() -> None:
+def test_all_free_drivers_come_to_rest():
     data = simulate(wheels({"kind": "constant", "effort": 0.45}), 3.0, 30)
     done = 6.0 * 0.05 / (0.6 - 0.45)
     assert [(kind, of) for kind, of, *_ in events(data)] == [("stick", "W"), ("stick", "A"), ("rest", "A")]
@@ -297,14 +289,14 @@ def test_all_free_drivers_come_to_rest() -> None:
     assert "simulate.rests" in findings(switched)
 
 
-def test_nothing_starts() -> None:
+def test_nothing_starts():
     data = simulate(wheels({"kind": "constant", "effort": 0.45}, speed=0.0), 1.0, 4)
     assert findings(data)["simulate.stays_at_rest"]["share"] == pytest.approx(0.75)
     assert data.resting.values.all()
     assert not data.drive_rate.values.any()
 
 
-def test_a_braked_motor_with_a_lossy_gear_stops_as_its_closed_form_says() -> None:
+def test_a_braked_motor_with_a_lossy_gear_stops_as_its_closed_form_says():
     motor = {"kind": "constant", "effort": 2, "efficiency": 0.8, "off_from": 1.0, "brake": 0.4, "brake_from": 1.0}
     data = simulate(beside(wheel(motor, drag=0.6)), 3.0, 30)
     assert ("stick", "A", pytest.approx(2.0, abs=1e-8)) in [event[:3] for event in events(data)]

@@ -1,7 +1,5 @@
 """A slice of `python -m benchmarks.random_mechanisms`, and that its judge sees what it is there to see."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from benchmarks.drawn import planar, spatial
@@ -36,7 +34,7 @@ JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
     ],
     ids=["planar", "kinks", "spatial", "seats"],
 )
-def test_random_mechanisms(space: str, seeds: Any) -> None:
+def test_random_mechanisms(space, seeds):
     """Every solved position keeps every limit, and most positions are solved."""
     found = [examine(space, seed, STEPS, whole=False) for seed in seeds]
     assert not any(one.refused for one in found)
@@ -46,7 +44,7 @@ def test_random_mechanisms(space: str, seeds: Any) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("space", "seed"), [("planar", 3), ("planar", 8097), ("planar", 8260), ("spatial", 0)])
-def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
+def test_the_quick_way_has_the_same_numbers(space, seed):
     """What leaves out the locking margin publishes what `analyse` does, bit by bit."""
     _, data = DRAWN[space](seed)
     quick, whole = (result_of(data, STEPS, way) for way in (False, True))
@@ -57,7 +55,7 @@ def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.15])
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "screwed strut"])
-def test_every_mechanism_of_the_tests_is_right(name: str, friction: float) -> None:
+def test_every_mechanism_of_the_tests_is_right(name, friction):
     data = model(MODELS[name](), friction=friction)
     result = brief(Mechanism(**data), STEPS)
     judged(data, result)
@@ -72,7 +70,7 @@ def test_every_mechanism_of_the_tests_is_right(name: str, friction: float) -> No
 @pytest.mark.spread(8, "RSUR-True", "HUSR-True")  # a cross, whose two pins are felt by each other
 @pytest.mark.parametrize("friction", [False, True])
 @pytest.mark.parametrize("name", mechanisms_space.NAMES)
-def test_every_mechanism_in_space_is_right(name: str, friction: bool) -> None:
+def test_every_mechanism_in_space_is_right(name, friction):
     """With all kinds of joints, both models of a bearing's friction, and the pins of a cross, which feel each other."""
     data = mechanisms_space.with_friction(name, friction)
     result = brief(Mechanism(**data), 9)
@@ -80,7 +78,7 @@ def test_every_mechanism_in_space_is_right(name: str, friction: bool) -> None:
     assert np.count_nonzero(result["status"] == Status.SOLVED) > 5
 
 
-def test_the_judge_sees_a_joint_beside_its_seat() -> None:
+def test_the_judge_sees_a_joint_beside_its_seat():
     """A seat that is off by a thousandth of its clearance puts reactions, and the pin, where they are not."""
     _, data = planar.seated(2)
     wrong = judged_planar.judge(data, altered(result_of(data, STEPS, whole=False), "seat_offset", 1.001))
@@ -88,7 +86,7 @@ def test_the_judge_sees_a_joint_beside_its_seat() -> None:
     assert wrong.worst("balance")[0] > 1e-9
 
 
-def altered(result: Results, name: str, factor: float) -> Results:
+def altered(result, name, factor):
     """The same with one array times a factor."""
     arrays = {**result.arrays, name: result.arrays[name] * factor}
     labels = {dim: list(places) for dim, places in result.places.items()}
@@ -104,7 +102,7 @@ def altered(result: Results, name: str, factor: float) -> Results:
      ("point_velocity", "motion"), ("point_acceleration", "motion"), ("joint_rotation_velocity", "motion"),
      ("joint_slide_velocity", "motion")],
 )  # fmt: skip
-def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> None:
+def test_the_judge_sees_a_wrong_number(space, name, check):
     """A result that is off by 1e-6 of itself is over the limit in the check that is about it."""
     if space == "spatial" and name == "friction_torque":
         name = "friction_moment"  # the torque is what the model has, the moment what acts
@@ -119,7 +117,7 @@ LET_GO = (1, 2, 12, 5, 10, 24, 34)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", LET_GO)
-def test_they_move_as_all_their_links_must(seed: int) -> None:
+def test_they_move_as_all_their_links_must(seed):
     """Gravity, forces, springs, dampers, and friction in pins and guides by its law from the multipliers."""
     what, off = examine_free(seed)
     assert what.startswith("compared")
@@ -127,7 +125,7 @@ def test_they_move_as_all_their_links_must(seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_spatial_one_moves_as_all_its_links_must() -> None:
+def test_a_spatial_one_moves_as_all_its_links_must():
     """A crank with a rod of two balls: gravity, forces, moments, and a spring with a damper of some."""
     what, off = examine_free_spatial(2)
     assert what.startswith("compared")

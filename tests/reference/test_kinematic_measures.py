@@ -1,8 +1,5 @@
 """Speeds, angles, dwells, expressions and starting times as measures, against closed forms and differences."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -10,6 +7,7 @@ from scipy.optimize import brentq
 import trunnion
 from measured import figures
 from mechanisms import build, four_bar, slider_crank
+from mechanisms_parts import example
 from mechanisms_space import rssr
 from timed import LINEAR, wheel
 from trunnion import Mechanism, MechanismError
@@ -18,33 +16,32 @@ from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import Measure, named
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.solve.shifts import HOLE
 from trunnion.studies.tolerance.kernel import CompiledCourses, kernel_of
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, W = 0.3, 1.0, 2.0  # crank and rod, m; drive speed, rad/s
 
 
 @pytest.fixture(scope="module")
-def centric() -> Run:
+def centric():
     """A slider-crank in line that turns counterclockwise."""
     return prepare(build({**slider_crank(R, L, 0.0), "drivers": {"A": {"speed": W}}}))
 
 
 @pytest.fixture(scope="module")
-def spatial() -> Run:
-    return prepare(trunnion.read(EXAMPLES / "rssr.yaml"))
+def spatial():
+    return prepare(example("rssr"))
 
 
-def course(run: Run, name: str, time: Any) -> Any:
+def course(run, name, time):
     """A measure at some times, s."""
     measure = named(run.system.mechanism, [name], run.values)[0]
     back = run.solve(time) if not measure.of_motion else run.walk(time)
     return np.broadcast_to(measure.curve(back)[0], np.shape(time))
 
 
-def test_speeds_of_the_slider_crank(centric: Run) -> None:
+def test_speeds_of_the_slider_crank(centric):
     """x = r cos θ + √(l² − r² sin² θ), differentiated twice by θ."""
     angle = np.linspace(0.1, 6.1, 13)
     s, c = np.sin(angle), np.cos(angle)
@@ -64,7 +61,7 @@ def test_speeds_of_the_slider_crank(centric: Run) -> None:
     np.testing.assert_allclose(course(centric, "joint_acceleration:B", time), second, rtol=1e-11)  # the crank has none
 
 
-def test_strokes_along_directions(centric: Run) -> None:
+def test_strokes_along_directions(centric):
     """Twice the crank along the guide; across it none; of the crank pin in any direction."""
     asked = [
         Measure("slide", "stroke", "C"),
@@ -76,11 +73,11 @@ def test_strokes_along_directions(centric: Run) -> None:
     np.testing.assert_allclose(list(found.values()), [2 * R, 2 * R, 0.0, 2 * R], atol=1e-12)
 
 
-def test_figures_of_the_speed(centric: Run) -> None:
+def test_figures_of_the_speed(centric):
     """The crank pin goes round at r ω: its components have that amplitude, its root mean square is r ω/√2."""
     of = {"kind": "velocity", "subject": "crank.B", "axis": "x"}
     asked = [
-        Measure(one, **of, statistic=one)  # type: ignore[arg-type]
+        Measure(one, **of, statistic=one)
         for one in ("maximum", "minimum", "peak-to-peak", "mean", "rms", "largest", "place-of-maximum")
     ]
     found = figures(centric, asked, 180)
@@ -89,7 +86,7 @@ def test_figures_of_the_speed(centric: Run) -> None:
     assert found["place-of-maximum"] % (2 * np.pi) == pytest.approx(1.5 * np.pi, abs=1e-9)
 
 
-def test_dwell_within_a_band(centric: Run) -> None:
+def test_dwell_within_a_band(centric):
     """r cos θ is above c for arccos(c/r)/π of the time; with its derivative by r."""
     band = Measure("dwell", "point", "crank.B", "x", statistic="dwell", within=(0.1, 1.0))
     assert figures(centric, [band], 360)["dwell"] == pytest.approx(np.arccos(0.1 / R) / np.pi, abs=1e-8)
@@ -102,7 +99,7 @@ def test_dwell_within_a_band(centric: Run) -> None:
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_transmission_angle_by_the_law_of_cosines(side: float) -> None:
+def test_transmission_angle_by_the_law_of_cosines(side):
     """cos μ = (b² + c² − d²)/(2 b c), d² = a² + g² − 2 a g cos θ, folded; least where the crank is in line."""
     a, b, c, g = 0.3, 0.9, 0.7, 1.0
     run = prepare(build(four_bar(a, b, c, g, side)))
@@ -121,12 +118,12 @@ def test_transmission_angle_by_the_law_of_cosines(side: float) -> None:
     assert raised.value.findings[0].where == "joints.A"
 
 
-def slope(run: Run, name: str, time: Any, step: float = 1e-5) -> Any:
+def slope(run, name, time, step=1e-5):
     return (course(run, name, time + step) - course(run, name, time - step)) / (2 * step)
 
 
 @pytest.mark.slow
-def test_speeds_in_space_by_differences(spatial: Run) -> None:
+def test_speeds_in_space_by_differences(spatial):
     mechanism, time = spatial.system.mechanism, np.linspace(0.01, 0.15, 7)
     for point in [f"{link}.{point}" for link, names in mechanism.points.items() for point in names]:
         found = [course(spatial, f"velocity:{point}.{axis}", time) for axis in "xyz"]
@@ -150,7 +147,7 @@ def test_speeds_in_space_by_differences(spatial: Run) -> None:
         course(spatial, "transmission_angle:A", time)
 
 
-PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and where
+PARTS = {  # variable of `analyse` and where
     "effort:A": ("drive_effort", {"driver": "A"}), "power:A": ("drive_power", {"driver": "A"}),
     "reaction:P.y": ("reaction_force", {"joint": "P", "axis": "y"}), "rotation:P": ("joint_rotation", {"joint": "P"}),
     "rate:P": ("joint_rotation_velocity", {"joint": "P"}), "slide:C": ("joint_slide", {"joint": "C"}),
@@ -161,7 +158,7 @@ PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and wh
 }  # fmt: skip
 
 
-def test_measures_are_the_numbers_of_the_analysis() -> None:
+def test_measures_are_the_numbers_of_the_analysis():
     """At every position, and over the cycle: efficiency, root mean square, energy lost, and those the model states."""
     data = slider_crank(R, L, 0.1)
     data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N", "useful": True}
@@ -192,7 +189,7 @@ def test_measures_are_the_numbers_of_the_analysis() -> None:
 
 
 @pytest.mark.slow
-def test_forces_in_space_are_those_of_the_analysis() -> None:
+def test_forces_in_space_are_those_of_the_analysis():
     """Effort, reaction and its size, power lost, of an RSSR with friction."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))
     result = trunnion.analyse(run.system.mechanism, 24)
@@ -207,9 +204,9 @@ def test_forces_in_space_are_those_of_the_analysis() -> None:
         np.testing.assert_allclose(course(run, name, time), values, rtol=1e-9, err_msg=name)
 
 
-def test_play_of_a_speed() -> None:
+def test_play_of_a_speed():
     """By derivatives of the whole motion, against differences with a pin moved in its hole."""
-    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data = example("fourbar-with-play").data()
     data["measures"] = {"speed": {"velocity": "rocker.C", "limit": "1 m/s"}}
     data = Mechanism(**data).with_seats("free").data()
     on_hole = {name: joint | {"seat_on": joint["links"][1]} for name, joint in data["joints"].items()}
@@ -229,14 +226,14 @@ def test_play_of_a_speed() -> None:
                 np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
-def model(more: dict[str, Any] | None = None, **measures: Any) -> Mechanism:
+def model(more=None, **measures):
     """A crank and rocker without friction, and its measures."""
     data = four_bar() | {"dimensions": {"ab": "0.3 m"}, "measures": measures, **(more or {})}
     crank = {"points": {"A": [0, 0], "B": ["ab", 0]}, "mass": 1.0, "centre": ["ab/2", 0], "inertia": 0.1}
     return Mechanism(**data | {"links": data["links"] | {"crank": crank}})
 
 
-def test_a_lead_is_the_difference_of_angles_without_jumps() -> None:
+def test_a_lead_is_the_difference_of_angles_without_jumps():
     found = trunnion.analyse(model(input={"rotation": "A"}, lead="input - D.rotation"), steps=48)
     angles = (np.unwrap(found.joint_rotation.sel(joint=joint).values) for joint in "AD")
     lead = np.subtract(*angles)
@@ -244,7 +241,7 @@ def test_a_lead_is_the_difference_of_angles_without_jumps() -> None:
     assert values - values[0] == pytest.approx(lead - lead[0], abs=1e-12)
 
 
-def test_error_of_a_universal_joint_against_even_rotation() -> None:
+def test_error_of_a_universal_joint_against_even_rotation():
     """θ₂ − θ₁ of a Cardan joint bent by β swings between ±arctan((1 − cos β)/(2 √cos β)).
 
     Source: F. Duditza, Kardangelenkgetriebe und ihre Anwendungen, 1973.
@@ -257,14 +254,14 @@ def test_error_of_a_universal_joint_against_even_rotation() -> None:
     assert float(found.measure_figure.sel(measure="error")) == pytest.approx(swing, rel=1e-9)
 
 
-def test_derivatives_are_those_of_differences() -> None:
+def test_derivatives_are_those_of_differences():
     own = {"lead": "B.rotation - 2 * D.rotation", "torque": {"effort": "A"}, "mixed": "lead * torque / ab"}
     mechanism = model(**own)
     run = prepare(mechanism)
     measures = named(mechanism, ["lead", "mixed"], run.values)
     kernel, time = NumpyKernel(run, measures, FrictionMethod()), np.linspace(0.1, 1.4, 7)
 
-    def at(ab: Any) -> Any:
+    def at(ab):
         return kernel.courses(mechanism.parameters({"dimensions.ab": ab}), time)[0]
 
     exact, above, below = at(Dual(0.3, 1.0)), at(0.3 + 1e-6), at(0.3 - 1e-6)
@@ -273,7 +270,7 @@ def test_derivatives_are_those_of_differences() -> None:
         assert exact[measure.name][0].dual == pytest.approx(slope, rel=1e-6, abs=1e-6)
 
 
-def test_both_engines_agree() -> None:
+def test_both_engines_agree():
     mechanism = model(lead="A.rotation - D.rotation", twice="2 * lead", ratio="A.effort / (1 N m) + sqrt(ab / (1 m))")
     run = prepare(mechanism)
     measures, method = named(mechanism, ["lead", "twice", "ratio"], run.values), FrictionMethod()
@@ -285,7 +282,7 @@ def test_both_engines_agree() -> None:
         assert one[measure.name][0] == pytest.approx(other[measure.name][0], abs=1e-9)
 
 
-def test_a_sweep_and_a_tolerance_know_them() -> None:
+def test_a_sweep_and_a_tolerance_know_them():
     own = {"lead": {"expression": "A.rotation - D.rotation", "as": "maximum", "over": ["60 deg", "200 deg"]}}
     toleranced = model({"tolerances": {"ab": {"limits": "±1 mm"}}}, **own)
     swept = trunnion.sweep(toleranced, over={"ab": np.array([0.299, 0.301])}, measures=["lead"])
@@ -297,7 +294,7 @@ def test_a_sweep_and_a_tolerance_know_them() -> None:
     assert 2 * float(found.worst_case_upper) == pytest.approx(abs(ends[1] - ends[0]), rel=1e-3)
 
 
-def test_an_expression_that_is_its_own_circle_or_means_nothing_is_a_finding() -> None:
+def test_an_expression_that_is_its_own_circle_or_means_nothing_is_a_finding():
     for text, says in [
         ("2 * lead", "itself"), ("input - ab", "added"), ("high - low", "at every position"), ("__import__('os')", ""),
         ("swing + input", "without place, range"),
@@ -313,14 +310,14 @@ DURATION = 12.0
 MEASURE = {"starting_time": "A", "duration": DURATION}
 
 
-def starting_time(inertia: float) -> float:
+def starting_time(inertia):
     """Of J ω̇ = 4 (1 − ω/150) − 0.6, where the mean of a turn is 95 % of that of the last in DURATION."""
     tau, turn = inertia * 150 / 4, 2 * np.pi
 
-    def gone(time: float) -> float:
+    def gone(time):
         return 127.5 * float(time - tau * (1 - np.exp(-time / tau)))
 
-    def takes(time: float) -> float:
+    def takes(time):
         return time - float(brentq(lambda t: gone(t) - gone(time) + turn, 0.0, time, xtol=1e-14))
 
     limit = takes(DURATION) / 0.95
@@ -328,7 +325,7 @@ def starting_time(inertia: float) -> float:
 
 
 @pytest.mark.slow
-def test_first_order_of_the_starting_time() -> None:
+def test_first_order_of_the_starting_time():
     """The sensitivity to the inertia, by differences of the closed form; samples scatter about it."""
     sections = {"tolerances": {"links.wheel.inertia": 0.001}, "measures": {"start": MEASURE}}
     mechanism = Mechanism(**{**wheel(LINEAR).data(), **sections})
@@ -343,7 +340,7 @@ def test_first_order_of_the_starting_time() -> None:
 
 
 @pytest.mark.slow
-def test_samples_that_do_not_start_are_outside_every_limit() -> None:
+def test_samples_that_do_not_start_are_outside_every_limit():
     """Torques about the drag: half of them do not start."""
     data = wheel({**LINEAR, "stall_effort": 0.6}).data()
     data["tolerances"] = {"drivers.A.motor.stall_effort": {"limits": "±0.3 N m", "distribution": "uniform"}}

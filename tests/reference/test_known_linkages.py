@@ -1,8 +1,5 @@
 """Known linkages: what other means say of the examples, published states and figures of the theory sheet."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,22 +10,17 @@ from gallery.drawing import turns
 from gallery.entry import STEPS, slope
 from gallery.presses import jaw_angle
 from mechanisms import DURANGO
+from mechanisms_parts import example
 from trunnion import FrictionMethod, Status
 from trunnion.solve.run import prepare
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
-
-def example(name: str) -> trunnion.Mechanism:
-    return trunnion.read(EXAMPLES / f"{name}.yaml")
-
-
-def track(result: Any, point: str) -> Any:
+def track(result, point):
     x, y = result["point_position"].sel(point=point).transpose("axis", "position").values
     return x + 1j * y
 
 
-def test_toggle_amplifies_by_its_angle() -> None:
+def test_toggle_amplifies_by_its_angle():
     """F_out/F_in = (cos γ / tan α − sin γ)/2, γ of the cylinder above the horizontal: 1/(2 tan α) if it is level."""
     result = brief(example("toggle-press").with_friction("off"), STEPS)
     knee = track(result, "upper.A")
@@ -40,7 +32,7 @@ def test_toggle_amplifies_by_its_angle() -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("coefficient", [0.05, 0.1, 0.2])
-def test_toggle_locks_within_its_friction_circles(coefficient: float) -> None:
+def test_toggle_locks_within_its_friction_circles(coefficient):
     """The punch cannot push the knee away while one line touches the circles of O, A and P: knee nearer than 2 f ρ.
 
     The knee is the load, a resisting cylinder; which size it has does not matter.
@@ -58,7 +50,7 @@ def test_toggle_locks_within_its_friction_circles(coefficient: float) -> None:
     assert 0 < np.count_nonzero(locked) < 800
 
 
-def test_jaw_crusher_torque_of_the_rock() -> None:
+def test_jaw_crusher_torque_of_the_rock():
     """What the rock adds to the torque without friction is −M dψ/dθ while the jaw closes, else nothing."""
     ideal = example("jaw-crusher").with_friction("off")
     loaded = brief(ideal, STEPS)
@@ -70,7 +62,7 @@ def test_jaw_crusher_torque_of_the_rock() -> None:
 
 
 @pytest.mark.slow
-def test_double_butterfly_pins_and_torque() -> None:
+def test_double_butterfly_pins_and_torque():
     mechanism = example("double-butterfly").with_friction("off")
     result = trunnion.analyse(mechanism, 24)
     assert float(result["closure_residual"].max()) < 1e-13
@@ -95,13 +87,13 @@ MULTIPLIERS = (199.1753333731910, -29.75531228015052, 23.06654119098399, 31.4527
                11.61740700019673)  # fmt: skip
 
 
-def relative(one: Any, variable: str) -> Any:
+def relative(one, variable):
     """β, Θ, γ, Φ, δ, Ω, ε of the benchmark: three of them are between two links."""
     k = {name: float(one[variable].sel(link=name)) for name in one["link"].values}
     return np.array([k["K1"], k["K2"] - k["K1"], k["K3"], k["K4"] - k["K5"], k["K5"], k["K6"] - k["K7"], k["K7"]])
 
 
-def test_squeezer_from_rest() -> None:
+def test_squeezer_from_rest():
     """At the start: published accelerations, the torque that they come from and the first two multipliers."""
     start = brief(example("andrews-squeezer"), 4).isel(position=0)
     np.testing.assert_allclose(relative(start, "link_angle"), START, rtol=0, atol=1e-13)
@@ -112,7 +104,7 @@ def test_squeezer_from_rest() -> None:
     np.testing.assert_allclose(force, [98.5668703962410896, -6.12268834425566266], rtol=0, atol=1e-11)
 
 
-def test_squeezer_at_the_end() -> None:
+def test_squeezer_at_the_end():
     """Angles to rounding; rates to 1e-10 and accelerations to 1e-5 of the published, which is what those carry.
 
     K1 swings such that it has the β, β̇ and β̈ of the benchmark at t = 0.03 s.
@@ -135,7 +127,7 @@ RATE = 10.0  # rad/s, of the crank
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Any]:
+def results():
     mechanism = trunnion.read(DURANGO)
     return {"friction": trunnion.analyse(mechanism), "ideal": trunnion.analyse(mechanism.with_friction("off"))}
 
@@ -146,7 +138,7 @@ AT_SIXTY_DEGREES = {  # on the second link of the joint by the first: crank, cou
 }  # fmt: skip
 
 
-def test_torque_power_and_reactions_of_durangos_four_bar(results: dict[str, Any]) -> None:
+def test_torque_power_and_reactions_of_durangos_four_bar(results):
     """The figures of the theory sheet; T with friction − T without = P_friction/ω₁ at every position."""
     ideal, rubbed = (results[case]["drive_effort"].sel(driver="A").values for case in ("ideal", "friction"))
     extremes = [ideal.min(), ideal.max(), rubbed.min(), rubbed.max()]
@@ -162,7 +154,7 @@ def test_torque_power_and_reactions_of_durangos_four_bar(results: dict[str, Any]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
-def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
+def test_zero_slip_is_an_interval(results):
     """At 0° and 180° the relative speed at C is exactly zero; the torque is bracketed by either sign of friction."""
     result = results["friction"]
     status = result["status"].values
@@ -177,7 +169,7 @@ def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("position", [0.0, np.pi])
-def test_interval_holds_the_limits_from_both_sides(results: dict[str, Any], position: float) -> None:
+def test_interval_holds_the_limits_from_both_sides(results, position):
     """On either side friction at C is fully on; both torques, extrapolated to the place itself, are the ends."""
     run = prepare(trunnion.read(DURANGO))
     result, index = results["friction"], round(np.degrees(position))
@@ -191,7 +183,7 @@ def test_interval_holds_the_limits_from_both_sides(results: dict[str, Any], posi
 
 
 @pytest.mark.parametrize(("limit", "share"), [(3, 1e-3), (1, 5e-2)])
-def test_three_iterations_suffice(limit: int, share: float) -> None:
+def test_three_iterations_suffice(limit, share):
     """The paper's statement: after three iterations within 0.1 % at ten equally spaced positions."""
     run = prepare(trunnion.read(DURANGO))
     time = run.cycle.times(10)

@@ -6,11 +6,9 @@ cos θ = (x₀² + r² − l²)/(2 r x₀). The useful work of a turn is F (r + 
 """
 
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from presses import arm, press
 from scipy.integrate import quad
 
@@ -24,24 +22,23 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.studies.tolerance.linear import study
 
-Array = NDArray[np.float64]
 FORCE, BEGIN = 50e3, np.radians(320.3)
 
 
-def cut(force: str = "-50 kN * between(drive, 320.3 deg, 350 deg)", start: float = 180.0, **more: Any) -> Mechanism:
+def cut(force="-50 kN * between(drive, 320.3 deg, 350 deg)", start=180.0, **more):
     """The press with a force on its ram along x."""
     loads = {"cut": {"link": "ram", "at": "Q", "force": [force, 0]}}
     drivers = {"O": {"speed": "60 rpm", "start": f"{start} deg"}}
     return press(**{"loads": loads, "drivers": drivers, **more})
 
 
-def summary(result: Any) -> dict[str, Any]:
+def summary(result):
     return {one.name: one for one in result.trunnion.summary}
 
 
 @pytest.mark.parametrize("steps", [12, 180])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_extreme_is_that_at_the_jump(steps: int, sign: int) -> None:
+def test_an_extreme_is_that_at_the_jump(steps, sign):
     """Of effort and reaction alike, with its place; a load that pulls makes the least effort."""
     result = trunnion.analyse(cut(f"{-sign * 50} kN * between(drive, 320.3 deg, 350 deg)"), steps)
     figures = summary(result)
@@ -53,7 +50,7 @@ def test_an_extreme_is_that_at_the_jump(steps: int, sign: int) -> None:
     assert float(np.abs(result["drive_effort"]).max()) < 0.999 * abs(effort.value)  # the positions stay as they are
 
 
-def test_a_reaction_that_is_largest_at_another_jump_than_the_effort_is_located_too() -> None:
+def test_a_reaction_that_is_largest_at_another_jump_than_the_effort_is_located_too():
     """The torque is largest soon after the load begins, the reactions where it ends, nearer to the dead centre."""
     angle, drive = np.radians(357.3), np.linspace(BEGIN, np.radians(357.3), 100_001)
     torque = (50e3 + 40e3 * (drive - BEGIN) / 0.6457718) * arm(drive)
@@ -66,13 +63,13 @@ def test_a_reaction_that_is_largest_at_another_jump_than_the_effort_is_located_t
     assert figures["P.reaction_max"].value == pytest.approx(90e3 / tilt, rel=1e-6)
 
 
-def test_the_start_of_a_cycle_is_beside_its_end() -> None:
+def test_the_start_of_a_cycle_is_beside_its_end():
     """A load that ends with the cycle has its jump behind the last position."""
     found = summary(trunnion.analyse(cut("50 kN * between(drive, 0 deg, 39.7 deg)", 39.6), 90))
     assert found["O.effort_max"].value == pytest.approx(FORCE * arm(BEGIN), rel=1e-6)
 
 
-def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
+def test_a_jump_above_the_top_of_a_sample_is_met():
     """Of the nominal mechanism the top is smooth, of samples it may be beside the jump."""
     forces = ["-50 kN * wide / 20 mm * between(drive, 320.3 deg, 350 deg)", "35.58 kN * max(sin(drive), 0)"]
     loads = {str(k): {"link": "ram", "at": "Q", "force": [force, 0]} for k, force in enumerate(forces)}
@@ -90,7 +87,7 @@ def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
     assert figures[-1] == pytest.approx(FORCE * wide[-1] / 0.02 * arm(BEGIN), rel=1e-7)
 
 
-def test_the_drive_of_a_press_whose_load_jumps() -> None:
+def test_the_drive_of_a_press_whose_load_jumps():
     """Power in = power out: T = F x'(θ) from 320.3° to 350°, else 0."""
     end, places = np.radians(350), np.array([BEGIN, np.radians(350)])
     work = FORCE * np.ptp(0.03 * np.cos(places) + np.sqrt(0.2**2 - (0.03 * np.sin(places)) ** 2))
@@ -116,8 +113,8 @@ LOADS = {
 }
 
 
-def model(load: str = "at once", **more: Any) -> Mechanism:
-    sections: dict[str, Any] = {
+def model(load="at once", **more):
+    sections = {
         "loads": {"press": {"joint": "S", "resisting_force": LOADS[load], "only": "positive"}},
         "measures": {"peak": {"effort": "O", "as": "maximum"}},
         "tolerances": {name: f"±{1e3 * limit:g} mm" for name, limit in LIMIT.items()},
@@ -125,19 +122,19 @@ def model(load: str = "at once", **more: Any) -> Mechanism:
     return press({"x0": START, "F": "50 kN"}, **{**sections, **more})
 
 
-def peak(r: Any = R, l: Any = L, x0: Any = START) -> Any:  # noqa: E741
+def peak(r=R, l=L, x0=START):  # noqa: E741
     """The torque where the load begins, N m."""
     cosine = (x0**2 + r**2 - l**2) / (2 * r * x0)
     return FORCE * r * np.sqrt(1 - cosine**2) * x0 / (x0 - r * cosine)
 
 
-def slope(name: str, step: float = 1e-6) -> float:
+def slope(name, step=1e-6):
     at = {"r": R, "l": L, "x0": START}
     return float(peak(**{**at, name: at[name] + step}) - peak(**{**at, name: at[name] - step})) / (2 * step)
 
 
 @pytest.mark.parametrize("load", LOADS)
-def test_the_peak_and_its_derivatives_are_those_where_the_load_begins(load: str) -> None:
+def test_the_peak_and_its_derivatives_are_those_where_the_load_begins(load):
     result = trunnion.tolerance(model(load), methods=("linear", "worst-case"), steps=72)
     assert float(result["nominal"][0]) == pytest.approx(peak(), rel=1e-5)
     figure = trunnion.analyse(model(load), 72)["measure_figure"].sel(measure="peak")
@@ -155,7 +152,7 @@ def test_the_peak_and_its_derivatives_are_those_where_the_load_begins(load: str)
     assert float(result["searched_upper"][0]) == pytest.approx(max(corners) - peak(), rel=1e-3)
 
 
-def test_samples_have_the_scatter_of_a_monte_carlo_of_the_formula() -> None:
+def test_samples_have_the_scatter_of_a_monte_carlo_of_the_formula():
     result = trunnion.tolerance(model(), methods=("linear", "monte-carlo"), samples=10_000, steps=72)
     rng = np.random.default_rng(3)
     sizes = zip((R, L, START), LIMIT.values(), strict=True)
@@ -166,7 +163,7 @@ def test_samples_have_the_scatter_of_a_monte_carlo_of_the_formula() -> None:
     assert "first_order.scatter_differs" not in {one.code for one in result.trunnion.findings}
 
 
-def test_the_worst_case_found_includes_a_play() -> None:
+def test_the_worst_case_found_includes_a_play():
     """Of the pin of rod and ram: carried by the rod it is a longer one, by the ram it moves where the load begins."""
     play, data = 0.04e-3, model().data()
     data["joints"]["Q"]["pin"] = {"radius": "20 mm", "clearance": "0.04 mm"}
@@ -185,7 +182,7 @@ def test_the_worst_case_found_includes_a_play() -> None:
 @pytest.mark.parametrize(
     ("criterion", "code"), [("worst-case", "allocation.worst_case_beyond"), ("yield", "yield.missed")]
 )
-def test_an_allocation_by_first_order_that_does_not_hold_is_an_error(criterion: Any, code: str) -> None:
+def test_an_allocation_by_first_order_that_does_not_hold_is_an_error(criterion, code):
     """The stroke √((l + r)² − e²) − √((l − r)² − e²) has no derivative by the offset e of the slide at e = 0."""
     offset = press(
         tolerances={"e": "±4 mm", "r": "±0.1 um"},
@@ -196,7 +193,7 @@ def test_an_allocation_by_first_order_that_does_not_hold_is_an_error(criterion: 
     assert {one.code: one.severity for one in result.trunnion.findings}[code] == "error"
 
 
-def test_the_dead_centre_under_load_is_that_of_a_window_before_it() -> None:
+def test_the_dead_centre_under_load_is_that_of_a_window_before_it():
     """The ram is held back by three clearances; the load ends as it turns round, where no figure of a seat is valid."""
     clearance, end, data = 20e-6, 359.5, model().data()
     for name in ("O", "P", "Q"):
@@ -209,14 +206,14 @@ def test_the_dead_centre_under_load_is_that_of_a_window_before_it() -> None:
     assert float(figure) == pytest.approx(ideal - 3 * clearance, abs=1e-8)
 
 
-def test_a_sweep_has_no_efficiency_where_the_load_never_acts() -> None:
+def test_a_sweep_has_no_efficiency_where_the_load_never_acts():
     """The ram reaches r + l: 210 and 220 mm do not reach the load at 222 mm."""
     result = trunnion.sweep(model(), {"r": ["10 mm", "20 mm", "30 mm"]}, steps=36)
     assert np.isnan(result["efficiency"].values).tolist() == [True, True, False]
 
 
 @pytest.mark.slow
-def test_two_corners_that_are_as_high_do_not_cancel() -> None:
+def test_two_corners_that_are_as_high_do_not_cancel():
     """A press in line whose force acts both ways: a slide off the line raises one of its peaks as it lowers the other.
     That of half a turn alone is the same size."""
     top = {"effort": "O", "as": "maximum"}
@@ -237,7 +234,7 @@ def test_two_corners_that_are_as_high_do_not_cancel() -> None:
 
 
 PUSH, CRANK, TOUCH, TIME = 800.0, 0.05, 0.24, 0.5
-FIGURES: dict[str, dict[str, Any]] = {
+FIGURES = {
     "power": {"power": "press", "as": "mean"},
     "within": {"power": "press", "as": "mean", "over": ["290 deg", "350 deg"]},
     "torque": {"effort": "O", "as": "rms"},
@@ -245,7 +242,7 @@ FIGURES: dict[str, dict[str, Any]] = {
 }
 
 
-def touching(start: float = 0.0, numbers: dict[str, float] | None = None, **more: Any) -> Mechanism:
+def touching(start=0.0, numbers=None, **more):
     """A press over the last of its stroke, with other dimensions, m, and another start, deg."""
     load = {"joint": "S", "resisting_force": f"{PUSH} N * between(ram.Q.x, touch, 1 m)", "only": "positive"}
     drivers = {"O": {"speed": "120 rpm", "start": f"{start} deg"}}
@@ -253,7 +250,7 @@ def touching(start: float = 0.0, numbers: dict[str, float] | None = None, **more
     return press({"r": CRANK, "touch": TOUCH, **(numbers or {})}, **sections)
 
 
-def sampled(mechanism: Mechanism, **numbers: Array) -> dict[str, Array]:
+def sampled(mechanism, **numbers):
     """The figures of many presses at once, as a study has them."""
     run = prepare(mechanism)
     spread = {
@@ -264,7 +261,7 @@ def sampled(mechanism: Mechanism, **numbers: Array) -> dict[str, Array]:
     return {name: np.asarray(read.figure) for name, read in reads.items()}
 
 
-def single(mechanism: Mechanism) -> dict[str, float]:
+def single(mechanism):
     """The figures of one press by itself."""
     run = prepare(mechanism)
     return figures_of(run, named(mechanism, FIGURES, run.values), FrictionMethod())
@@ -272,7 +269,7 @@ def single(mechanism: Mechanism) -> dict[str, float]:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("start", [326.9, 100.0])
-def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: float) -> None:
+def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start):
     """Near the nominal place, far from it, and where the ram does not come to the load, or is at it throughout.
 
     The load begins nominally at 327°, beside the start of some of the turns.
@@ -291,7 +288,7 @@ def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: f
             assert found[name][k] == pytest.approx(exact[name], rel=2e-7, abs=1e-9), (name, k)
 
 
-def test_pins_in_seats_move_the_place_at_which_the_load_begins() -> None:
+def test_pins_in_seats_move_the_place_at_which_the_load_begins():
     """A pin on one side of its hole along the rod makes the rod longer by the clearance."""
     play, data = 1e-3, touching().data()
     data["joints"]["P"] |= {"pin": {"radius": 0.01, "clearance": play}, "seat": {"xi": "180 deg"}}
@@ -306,7 +303,7 @@ def test_pins_in_seats_move_the_place_at_which_the_load_begins() -> None:
 
 
 @pytest.mark.parametrize("touch", [TOUCH, 0.2505])
-def test_a_speed_that_varies_and_a_load_that_is_only_just_not_met(touch: float) -> None:
+def test_a_speed_that_varies_and_a_load_that_is_only_just_not_met(touch):
     """Useful power F (r + l − touch) n, whether the nominal ram comes to the load or not."""
     places = touch + np.array([0.0, -1e-3, 1e-3, -4e-3, 8e-3])
     speed = 4 * np.pi * np.array([1.0, 1 + 1e-6, 0.97, 1.05, 1.0])

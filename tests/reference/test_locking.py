@@ -1,26 +1,11 @@
 """Where friction locks: closed forms, a homotopy on the Newton–Euler equations, margins, multiples, the way back."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 
 import trunnion
 from brief import brief
-from mechanisms import (
-    DURANGO,
-    MODELS,
-    Array,
-    Data,
-    build,
-    findings,
-    five_bar,
-    four_bar,
-    model,
-    slide,
-    slider_crank,
-)
+from mechanisms import DURANGO, MODELS, build, findings, five_bar, four_bar, model, slide, slider_crank
 from mechanisms_parts import joined
 from mechanisms_space import cardan, rssr
 from reference.maximal_space import Drive, in_planes, pose_of
@@ -32,16 +17,16 @@ from trunnion.results.attributes import summary_of
 from trunnion.solve.backward import status_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.margin import locking_margin
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.solve.walk_kernel import WalkKernel
 
 ARM, GUIDE, LOAD = 0.15, 0.12, 40.0
 CRITICAL = GUIDE / (2 * ARM)
 
 
-def pushed_slider(coefficient: float, load: float = -LOAD) -> Mechanism:
+def pushed_slider(coefficient, load=-LOAD):
     """A ram pushes a slider through a rod parallel to the guide, ARM beside its middle."""
-    data: Data = {
+    data = {
         "links": {
             "ground": {"points": {"X": slide(0, ARM), "G": slide(0, 0)}},
             "ram": {"points": {"X": slide(0, 0), "P": [0.1, 0]}},
@@ -64,7 +49,7 @@ def pushed_slider(coefficient: float, load: float = -LOAD) -> Mechanism:
     [(-LOAD, 0.5), (-LOAD, 1 - 1e-6), (LOAD, 0.3), (LOAD, 3.0)],
     ids=["half", "brink", "helps", "rough"],
 )
-def test_below_the_critical_coefficient(load: float, share: float) -> None:
+def test_below_the_critical_coefficient(load, share):
     """P = W/(1 − 2 f a/L), finite up to the brink; pulled along the ram brakes, P = −W/(1 + 2 f a/L) for any f."""
     result = brief(pushed_slider(share * CRITICAL, load), 7)
     assert np.all(result["status"] == Status.SOLVED)
@@ -74,7 +59,7 @@ def test_below_the_critical_coefficient(load: float, share: float) -> None:
 
 
 @pytest.mark.parametrize("excess", [1 + 1e-5, 10.0])
-def test_above_the_critical_coefficient(excess: float) -> None:
+def test_above_the_critical_coefficient(excess):
     """Locked at the share 1/excess of the friction, found to 1e-6; NaN instead of the negative P of the formula."""
     mechanism = pushed_slider(excess * CRITICAL)
     run = prepare(mechanism)
@@ -91,7 +76,7 @@ def test_above_the_critical_coefficient(excess: float) -> None:
     assert error["figures"]["at"] == "at every position"
 
 
-def test_successive_approximation_never_calls_a_locked_position_solved() -> None:
+def test_successive_approximation_never_calls_a_locked_position_solved():
     """However long it iterates: it may diverge to infinity, but then it has not converged."""
     for limit in (20, 200, 5000):
         result = brief(pushed_slider(3 * CRITICAL), 3, FrictionMethod("successive-approximation", None, limit))
@@ -105,7 +90,7 @@ STEPS = 24
 GRID = 120  # steps of the share from 0 to 1
 
 
-def independent_shares(run: Run, data: Data, guide: float) -> Array:
+def independent_shares(run, data, guide):
     """Share of the friction, of each position, at which the solution that starts frictionless ends; 1 if none."""
     other, time = Oracle(in_planes(data)), (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
     walk = run.walk(time)
@@ -123,13 +108,13 @@ def independent_shares(run: Run, data: Data, guide: float) -> Array:
     slides = np.array([kind == "prismatic" for kind, _ in run.system.joints.values()])
     coefficients = np.array([other.coefficient(name) for name in run.system.joints])
 
-    def residual(sizes: Array, share: float) -> Array:
+    def residual(sizes, share):
         load = start + np.einsum("pjwl,pl->pjw", slope, sizes)
         force, moment = (np.linalg.norm(part, axis=-1) for part in np.split(load, 2, axis=-1))
         normal = np.where(slides, np.maximum(force, 2 * moment / guide), force)
         return np.asarray(sizes - share * coefficients * normal)
 
-    def jacobian(sizes: Array, share: float) -> Array:
+    def jacobian(sizes, share):
         scale = 1e-7 * (np.abs(sizes).max(axis=1, keepdims=True) + 1e-3)
         steps = scale * np.eye(len(slides))[:, None]  # (friction, position, friction)
         ends = [(residual(sizes + step, share), residual(sizes - step, share)) for step in steps]
@@ -155,20 +140,15 @@ def independent_shares(run: Run, data: Data, guide: float) -> Array:
 
 
 HEAVY = {
-    "four-bar": (1.0, 0.5, 0.4),
-    "four-bar, other branch": (1.0, 0.5, 0.4),
-    "slider-crank": (1.0, 0.3, 0.1),
-    "inverted slider-crank": (1.0, 0.2, 0.1),
-    "Scotch yoke": (0.4, 0.05, 0.4),
-    "tangent drive": (0.5, 0.02, 0.3),
-    "elliptic bar": (1.0, 0.2, 0.1),
-    "class III": (0.5, 0.2, 0.4),
-}
+    "four-bar": (1.0, 0.5, 0.4), "four-bar, other branch": (1.0, 0.5, 0.4), "slider-crank": (1.0, 0.3, 0.1),
+    "inverted slider-crank": (1.0, 0.2, 0.1), "Scotch yoke": (0.4, 0.05, 0.4), "tangent drive": (0.5, 0.02, 0.3),
+    "elliptic bar": (1.0, 0.2, 0.1), "class III": (0.5, 0.2, 0.4),
+}  # fmt: skip
 
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", HEAVY)
-def test_locked_positions(name: str) -> None:
+def test_locked_positions(name):
     """The same positions lock, each at the same share, as by small steps on the equations of all links at once."""
     coefficient, radius, guide = HEAVY[name]
     options = {"friction": coefficient, "radius": radius, "guide": guide}
@@ -186,7 +166,7 @@ def test_locked_positions(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("locks", [True, False])
-def test_efforts_and_reactions_have_no_maximum_where_they_grow_without_bound(locks: bool) -> None:
+def test_efforts_and_reactions_have_no_maximum_where_they_grow_without_bound(locks):
     """A short rod that presses a piston with friction aside; a piston that turns its crank up to its dead centre."""
     if locks:
         data = slider_crank(0.3, 0.5, 0.0)
@@ -207,7 +187,7 @@ SAME = 1e-9
 NEARLY = 1e-3  # of the margin, below and above which it is looked whether a position locks
 
 
-def pressed_slider(rng: np.random.Generator) -> Mechanism:
+def pressed_slider(rng):
     """A light slider-crank with a load across its guide, whose contact changes ends as the friction grows."""
     r = 0.03 * rng.uniform(0.7, 1.3)
     data = slider_crank(r, r * rng.uniform(2.5, 5.0), r * rng.uniform(-0.3, 0.3))
@@ -222,13 +202,13 @@ def pressed_slider(rng: np.random.Generator) -> Mechanism:
     return build(data, friction=0.25, radius=0.006 * rng.uniform(0.5, 1.5), guide=0.04)
 
 
-def crank_and_rocker(rng: np.random.Generator) -> Mechanism:
+def crank_and_rocker(rng):
     data = four_bar(*np.array([0.3, 0.9, 0.7, 1.0]) * rng.uniform(0.95, 1.05, 4))
     data["loads"]["work"] = {"joint": "D", "resisting_torque": rng.uniform(5.0, 60.0)}
     return build(data, friction=rng.uniform(0.4, 0.6), radius=rng.uniform(0.08, 0.15))
 
 
-def ball_rods(rng: np.random.Generator) -> Mechanism:
+def ball_rods(rng):
     data = rssr(friction=rng.uniform(0.3, 0.6)).data
     for name, joint in data["joints"].items():
         joint["pin"] = {"radius": rng.uniform(0.01, 0.02), **({"bearing": 0.02} if name in "AD" else {})}
@@ -236,14 +216,14 @@ def ball_rods(rng: np.random.Generator) -> Mechanism:
     return Mechanism.model_validate(data)
 
 
-def shafts(rng: np.random.Generator) -> Mechanism:
+def shafts(rng):
     """RCCC: a Cardan joint with errors."""
     data = cardan(rng.uniform(0.04, 0.08), rng.uniform(10.0, 40.0), rng.uniform(0.05, 0.5), rng.uniform(0.5, 5.0))
     data["joint_defaults"]["friction"] = rng.uniform(0.3, 0.5)
     return Mechanism.model_validate(data)
 
 
-DRAWN: dict[str, Callable[[np.random.Generator], Mechanism]] = {
+DRAWN = {
     "slider-crank": pressed_slider, "four-bar": crank_and_rocker, "RSSR": ball_rods, "RCCC": shafts,
     # the ram below, at coefficients of which it runs, one group locks or both
     "two groups": lambda rng: ram(rng.uniform(0.4, 2.0), rng.choice([0.0, 400.0])),
@@ -251,17 +231,17 @@ DRAWN: dict[str, Callable[[np.random.Generator], Mechanism]] = {
 CASES = [pytest.param(name, seed, id=f"{name}-{seed}") for name in DRAWN for seed in range(MECHANISMS)]
 
 
-def prepared(name: str, seed: int) -> Run:
+def prepared(name, seed):
     return prepare(DRAWN[name](np.random.default_rng(seed)))
 
 
-def margins(run: Run, time: Any) -> Any:
+def margins(run, time):
     with np.errstate(all="ignore"):
         back = run.solve(time, method=FrictionMethod(margin_up_to=10.0))
         return np.broadcast_to(locking_margin(back), time.shape).copy()
 
 
-def locked(run: Run, time: Any, multiple: Any) -> Any:
+def locked(run, time, multiple):
     with np.errstate(all="ignore"):
         back = run.solve(time, method=FrictionMethod(multiple=multiple))
         return np.broadcast_to(np.less(back.share, 1.0), time.shape)
@@ -270,7 +250,7 @@ def locked(run: Run, time: Any, multiple: Any) -> Any:
 @pytest.mark.sample(10)
 @pytest.mark.spread(4, "slider-crank-3", "slider-crank-9")
 @pytest.mark.parametrize(("name", "seed"), CASES)
-def test_a_margin_is_where_it_locks_whatever_is_solved_with_it(name: str, seed: int) -> None:
+def test_a_margin_is_where_it_locks_whatever_is_solved_with_it(name, seed):
     run = prepared(name, seed)
     time = run.cycle.times(MOMENTS)
     margin = margins(run, time)
@@ -284,7 +264,7 @@ def test_a_margin_is_where_it_locks_whatever_is_solved_with_it(name: str, seed: 
 @pytest.mark.sample(6)
 @pytest.mark.spread(2)
 @pytest.mark.parametrize(("name", "seed"), CASES)
-def test_the_compiled_margin_is_the_same(name: str, seed: int) -> None:
+def test_the_compiled_margin_is_the_same(name, seed):
     pytest.importorskip("llvmlite")
     run = prepared(name, seed)
     time = run.cycle.times(MOMENTS)
@@ -296,7 +276,7 @@ def test_the_compiled_margin_is_the_same(name: str, seed: int) -> None:
 POSITIONS = 24
 
 
-def ram(coefficient: float, aside: float = 0.0) -> Mechanism:
+def ram(coefficient, aside=0.0):
     """A crank with its block on a lever, which pushes a ram by a rod. aside: load on the lever alone, N."""
     axis = slide(0, 0)
     return Mechanism(
@@ -324,7 +304,7 @@ def ram(coefficient: float, aside: float = 0.0) -> Mechanism:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("coefficient", "aside"), [(0.4, 0.0), (2.0, 400.0)])
-def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient: float, aside: float) -> None:
+def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient, aside):
     """Whether it runs, one group locks or both, and whatever loads the inner one beside the outer."""
     found = brief(ram(coefficient, aside), POSITIONS)["locking_margin"].values
     times = float(np.nanmin(found)) * coefficient
@@ -335,7 +315,7 @@ def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient:
 
 
 @pytest.mark.slow
-def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
+def test_joints_of_a_group_without_loads_have_no_critical_multiple():
     found = locking(ram(2.0), POSITIONS)
     locked = found["status"].values == Status.LOCKED
     for joint, unknown in (("E", False), ("B", True)):
@@ -343,14 +323,11 @@ def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
 
 
 @pytest.mark.parametrize(("arm", "coefficient"), [(0.1, 0.2), (0.3, 0.2), (0.3, 0.5), (0.45, 0.6)])
-def test_drawer_driven_backward(arm: float, coefficient: float) -> None:
+def test_drawer_driven_backward(arm, coefficient):
     """A slide driven along its middle against a load beside it: N₁ + N₂ = 2 F a/L, so η = 1/(1 + 2 f a/L) forward and
     1 − 2 f a/L backward: it holds itself from f = L/2a."""
     mechanism = Mechanism(
-        links={
-            "ground": {"points": {"S": slide(0, 0)}},
-            "block": {"points": {"S": slide(0, 0), "P": [0, arm]}},
-        },
+        links={"ground": {"points": {"S": slide(0, 0)}}, "block": {"points": {"S": slide(0, 0), "P": [0, arm]}}},
         joints=joined("ground =S= block", S={"guide": {"length": 0.3}, "friction": coefficient}),
         drivers={"S": {"speed": 0.1, "range": [0, 0.2]}},
         loads={"weight": {"link": "block", "at": "P", "force": [-50.0, 0], "useful": True}},
@@ -374,7 +351,7 @@ FRICTIONAL = {
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", FRICTIONAL)
-def test_critical_multiples_are_where_it_locks(name: str) -> None:
+def test_critical_multiples_are_where_it_locks(name):
     """Just below it runs, just above it is locked: one joint's coefficient changed, away from reversals."""
     data, options = FRICTIONAL[name]
     steps, coefficient = 12, options["friction"]
@@ -400,7 +377,7 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_locking_says_nothing_where_there_is_no_answer() -> None:
+def test_locking_says_nothing_where_there_is_no_answer():
     """Positions that cannot be assembled have no margin and no multiple."""
     found = locking(build(four_bar(2.0, 1.5, 1.5, 4.0)), 36)
     gone = found["status"].values == Status.NOT_ASSEMBLED
@@ -412,7 +389,7 @@ def test_locking_says_nothing_where_there_is_no_answer() -> None:
 
 
 @pytest.mark.slow
-def test_what_locks_between_the_positions_is_found() -> None:
+def test_what_locks_between_the_positions_is_found():
     """From about 151° to 180°, of which 12 positions have none: the range and the share are those of many positions."""
     model = trunnion.read(DURANGO.parent / "toleranced-fourbar.yaml")
     model = model.with_values({"joint_defaults.friction.coefficient": 4.0})

@@ -1,29 +1,25 @@
 """Locking at every position: a crank against its friction circle in closed form, and what its states agree with."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import xarray as xr
 from test_locking import CRITICAL, pushed_slider
 
 import trunnion
 from mechanisms import eccentric_press
-from mechanisms_parts import Data, joined, plunger
+from mechanisms_parts import example, joined, plunger
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
-from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
+from trunnion.cycle.locking_course import NO_MARGIN, locking_course, passed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import prepare
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 ARM, RADIUS, FRICTION = 0.02, 0.012, 0.5
 
 
-def hoist(friction: float = FRICTION) -> Mechanism:
+def hoist(friction=FRICTION):
     """A crank on one pin that lifts a weight from hanging level to behind the top: the load passes its pin there."""
-    data: Data = {
+    data = {
         "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P": [ARM, 0]}}},
         "joints": joined("ground -A- crank", A={"pin": {"radius": RADIUS}, "friction": friction}),
         "drivers": {"A": {"speed": 1.0, "range": [0.0, 2.5]}},
@@ -32,17 +28,17 @@ def hoist(friction: float = FRICTION) -> Mechanism:
     return Mechanism(trunnion=1, **data)
 
 
-def course(mechanism: Mechanism) -> LockingCourse:
+def course(mechanism):
     found = locking_course(prepare(mechanism), FrictionMethod(margin_up_to=MARGIN))
     assert found is not None
     return found
 
 
-def states(found: xr.Dataset) -> np.ndarray:
+def states(found):
     return np.asarray(found["locking_state"].values)
 
 
-def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
+def test_a_crank_holds_its_load_inside_the_friction_circle():
     """Backdriven while the load's arm L cos θ exceeds f r, self-locking from there to the top and behind it, pulled on
     where the arm is below −f r: there the drive effort, which is positive before, is negative."""
     found = locking(hoist(), 401)
@@ -63,7 +59,7 @@ def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
     np.testing.assert_allclose([part.high for part in ranges], ends[1:], atol=1e-7)
 
 
-def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> None:
+def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches():
     """f r = |L cos θ|: the multiple of the friction is |L cos θ|/(f r), NaN where it is above 1: it does not hold."""
     found = locking(hoist(), 401)
     share = np.abs(ARM * np.cos(np.radians(found["drive"].values))) / (FRICTION * RADIUS)
@@ -71,9 +67,9 @@ def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> 
 
 
 @pytest.mark.parametrize(("first", "last", "told"), [(0.2, 1.4, "end"), (1.4, 1.8, "all"), (0.2, 2.5, "")])
-def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: float, last: float, told: str) -> None:
+def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first, last, told):
     """Of a hoist that stops where it holds; of one that holds all along; of one that its load drives on at the end."""
-    data: Data = hoist().data()
+    data = hoist().data()
     data["drivers"]["A"]["range"] = [first, last]
     run = prepare(Mechanism(**data))
     rows = {one.name: one for one in report_figures(run) if one.name.startswith("holding")}
@@ -87,7 +83,7 @@ def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: 
     assert rows["holding_multiple"].aspect == ("maximum" if told == "all" else "")
 
 
-def expected_states(arm: np.ndarray) -> np.ndarray:
+def expected_states(arm):
     """Of a load with this arm about a pin, in m, positive where it pulls backward."""
     hold = FRICTION * RADIUS
     conditions = [arm > hold, arm > 0, arm > -hold]
@@ -96,9 +92,9 @@ def expected_states(arm: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("steps", [5, 181])
-def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps: int) -> None:
+def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps):
     """The load has no power there, and no range of its own."""
-    data: Data = hoist().data()
+    data = hoist().data()
     data["drivers"]["A"]["range"] = [0.0, np.pi]
     found = locking(Mechanism(**data), steps)
     assert states(found)[steps // 2] == LockingState.SELF_LOCKING_FORWARD
@@ -107,7 +103,7 @@ def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps: int) -> 
     assert set(states(locking(Mechanism(**data), steps))) == {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON}
 
 
-def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
+def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it():
     """Of positions very near an end the margin is below 7 on one side only."""
     mechanism = eccentric_press()
     run = prepare(mechanism)
@@ -121,15 +117,15 @@ def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
             np.testing.assert_array_equal(np.asarray(margin) < 7.0, [False, True])
 
 
-def spring_hoist(**spring: object) -> Mechanism:
+def spring_hoist(**spring):
     """The crank of the hoist, pulled by a spring below its pin instead of the weight."""
-    data: Data = hoist().data()
+    data = hoist().data()
     data["links"]["ground"]["points"]["Q"] = [0, -0.1]
     data |= {"loads": {}, "springs": {"s": {"between": ["ground.Q", "crank.P"], **spring}}}
     return Mechanism(**data)
 
 
-def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
+def test_a_useful_spring_drives_backward_as_a_load_does():
     """Of a constant pull along the line to Q with the arm d about the pin: backward d − f r of d arrives."""
     found = locking(spring_hoist(preload=100.0, useful=True), 401)
     angle = np.radians(found["drive"].values)
@@ -144,7 +140,7 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
 
 
 @pytest.mark.parametrize("last", [1.2, 1.9, 2.5])
-def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float) -> None:
+def test_without_friction_all_that_a_useful_spring_stored_comes_back(last):
     """Wherever the range ends: nothing but the spring supplies work, and rounding makes no other answer."""
     data = spring_hoist(stiffness=1e4, free_length=0.1, useful=True).with_friction("off")
     run = prepare(data.with_values({"drivers.A.range.to": last}))
@@ -155,7 +151,7 @@ def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float
 
 
 @pytest.mark.parametrize("load", [-40.0, 40.0])
-def test_locked_forward_and_jammed(load: float) -> None:
+def test_locked_forward_and_jammed(load):
     """Beyond the critical coefficient the drawer locks: its state agrees with its status and with the way back."""
     found = locking(pushed_slider(1.3 * CRITICAL, load), 5)
     ahead = found["status"].values == Status.LOCKED
@@ -168,7 +164,7 @@ def test_locked_forward_and_jammed(load: float) -> None:
     assert not [part for part in near if np.any((part.low < time) & (time < part.high))]
 
 
-def test_ranges_cover_the_cycle_once_and_near_ones_are_below_the_margin() -> None:
+def test_ranges_cover_the_cycle_once_and_near_ones_are_below_the_margin():
     mechanism = eccentric_press()
     found = locking(mechanism, 90)
     margin, time = found["locking_margin"].values, found["time"].values
@@ -186,9 +182,9 @@ def test_ranges_cover_the_cycle_once_and_near_ones_are_below_the_margin() -> Non
     np.testing.assert_array_equal(close, (margin < near) & running)
 
 
-def test_what_masses_hold_is_no_self_locking() -> None:
+def test_what_masses_hold_is_no_self_locking():
     """A four-bar without friction whose links take more power than the load gives: no friction holds it."""
-    data = trunnion.read(EXAMPLES / "durango-fourbar.yaml").data()
+    data = example("durango-fourbar").data()
     data["drivers"]["A"]["range"] = [0.0, 0.08]
     mechanism = trunnion.Mechanism(**data).with_friction("off")
     found = {one.name: one for one in report_figures(prepare(mechanism))}
@@ -197,7 +193,7 @@ def test_what_masses_hold_is_no_self_locking() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.95, 1.05])
-def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
+def test_effort_to_open_a_clamp_past_its_dead_centre(share):
     """A crank presses a slider against a spring past the dead centre: what opens it is at the stop, by statics.
 
     A moment on the crank that is not useful takes a share of it; with more than all of it the clamp opens by itself.
@@ -228,9 +224,9 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     assert float(found["drive_effort_reverse"].max()) > 0  # where the spring opens it, it is held back
 
 
-def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:
+def test_a_short_range_ends_where_the_loads_cease_to_push():
     """Backward, by what acts on it: the end of a range need not lie next to a position that anything asked for."""
-    found = course(Mechanism.read(EXAMPLES / "double-butterfly.yaml"))
+    found = course(Mechanism.example("double-butterfly"))
     (part,) = [
         part for part in found.ranges() if part.state == LockingState.SELF_LOCKING and part.places[0] == "74.55°"
     ]

@@ -1,28 +1,24 @@
 """Means over the cycle, however many positions are asked for, by fine integrals; useful work and work beside it."""
 
 import json
-from collections.abc import Callable
 from math import pi
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import trunnion
-from mechanisms_parts import Data, joined, slide
+from mechanisms_parts import example, joined, slide
 from trunnion import Mechanism, analyse
 from trunnion.cycle.summary import balance
-from trunnion.errors import Finding, Status
+from trunnion.errors import Status
 from trunnion.measures.measures import named
 from trunnion.results.attributes import summary_of
 from trunnion.solve.loads import useful_loads
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import Mechanisms, bends
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-PRESS: dict[str, Any] = {  # of docs/how-to/model-file.md
+PRESS = {  # of docs/how-to/model-file.md
     "space": "planar",
     "dimensions": {"r": "40 mm", "l": "160 mm", "offset": "60 mm"},
     "links": {
@@ -44,11 +40,11 @@ LOADS = (
 )
 
 
-def press(force: str = LOADS[0], **changes: Any) -> Mechanism:
+def press(force=LOADS[0], **changes):
     return Mechanism(**(PRESS | changes)).with_values({"work.resisting_force": force})
 
 
-def finely(run: Run, cells: int) -> float:
+def finely(run, cells):
     """Efficiency by the midpoint rule over very many cells, straight from the walk."""
     time = (np.arange(cells) + 0.5) * run.cycle.duration / cells
     work = np.zeros(2)
@@ -60,7 +56,7 @@ def finely(run: Run, cells: int) -> float:
     return float(work[0] / work[1])
 
 
-def bumper() -> Mechanism:
+def bumper():
     """A spring that the ram just touches for some degrees."""
     data = json.loads(json.dumps(PRESS))
     data["links"]["frame"]["points"]["W"] = ["230 mm", "60 mm"]
@@ -74,14 +70,12 @@ def bumper() -> Mechanism:
     [
         *((lambda force=force: press(force), (60, 720), 1e-9, 360_000, 2e-4) for force in LOADS),
         (bumper, (60, 720), 1e-7, 200_000, 1e-5),
-        (lambda: trunnion.read(EXAMPLES / "rssr.yaml"), (50, 333), 1e-6, 60_000, 1e-4),
-        (lambda: trunnion.read(EXAMPLES / "klann.yaml"), (50, 333), 1e-6, 60_000, 1e-4),
+        (lambda: example("rssr"), (50, 333), 1e-6, 60_000, 1e-4),
+        (lambda: example("klann"), (50, 333), 1e-6, 60_000, 1e-4),
     ],
     ids=["drive", "pulse", "time", "bumper", "rssr", "klann"],
 )
-def test_efficiency_does_not_depend_on_the_number_of_positions(
-    mechanism: Callable[[], Mechanism], steps: tuple[int, int], same: float, cells: int, close: float
-) -> None:
+def test_efficiency_does_not_depend_on_the_number_of_positions(mechanism, steps, same, cells, close):
     found = [trunnion.analyse(mechanism(), count) for count in steps]
     values = [float(result["efficiency"]) for result in found]
     assert values[1] == pytest.approx(values[0], rel=same)
@@ -90,7 +84,7 @@ def test_efficiency_does_not_depend_on_the_number_of_positions(
 
 
 @pytest.mark.slow
-def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions() -> None:
+def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions():
     lengths = ["110 mm", "130 mm", "160 mm", "200 mm"]
     few, many = (trunnion.sweep(press(), {"l": lengths}, steps) for steps in (60, 720))
     one = [float(trunnion.analyse(press().with_values({"l": length}), 72)["efficiency"]) for length in lengths]
@@ -100,7 +94,7 @@ def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions
     np.testing.assert_allclose(few["efficiency"], one, rtol=1e-8)
 
 
-def test_a_load_that_no_position_meets_is_in_the_extremes() -> None:
+def test_a_load_that_no_position_meets_is_in_the_extremes():
     """Of 72 positions none lies in the 3° of the load; of 3600 thirty do."""
     most = [
         {one.name: one.value for one in summary_of(trunnion.analyse(press(), steps))}["O.effort_max"]
@@ -111,7 +105,7 @@ def test_a_load_that_no_position_meets_is_in_the_extremes() -> None:
     assert dense <= most[0] <= 1.02 * dense
 
 
-def test_bends_are_where_the_model_switches() -> None:
+def test_bends_are_where_the_model_switches():
     run = prepare(press())
     (found,) = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
     degrees = found / run.cycle.duration * 360
@@ -123,9 +117,9 @@ def test_bends_are_where_the_model_switches() -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("model", ["fourbar-with-play", "rssr-with-play"])
-def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
+def test_extremes_are_of_positions_that_are_valid(model):
     """Where a pin loses contact its forces are no answer: the summary, a sweep and the report leave them out."""
-    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml").with_values({"A.speed": "300 rpm"})
+    mechanism = example(model).with_values({"A.speed": "300 rpm"})
     result, dense = (trunnion.analyse(mechanism, steps) for steps in (360, 7200))
     lost = result["status"].values == Status.CONTACT_LOST
     assert np.any(lost)
@@ -143,7 +137,7 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     assert int(swept["not_valid"][0]) == np.count_nonzero(lost)
 
 
-def shaft(driver: Data, body: Data | None = None, **more: Any) -> Mechanism:
+def shaft(driver, body=None, **more):
     points = {"points": {"A": [0, 0]}}
     links = {"ground": points, "shaft": {**points, **(body or {})}}
     return Mechanism(links=links, joints=joined("ground -A- shaft"), drivers={"A": driver}, **more)
@@ -152,18 +146,12 @@ def shaft(driver: Data, body: Data | None = None, **more: Any) -> Mechanism:
 @pytest.mark.parametrize(
     ("torques", "spring", "marked", "share"),
     [
-        ({"mill": 6.0, "fan": 2.0}, 0.0, "mill", 0.75),
-        ({"mill": 6.0, "fan": 2.0}, 0.0, "fan", 0.25),
-        ({"mill": 6.0, "fan": 2.0}, 0.0, "", 1.0),
-        ({"brake": 6.0}, 4.0, "", 0.6),
-        ({"brake": 6.0}, 4.0, "brake", 0.6),
-        ({"brake": 6.0}, 4.0, "coil", 0.4),
-        ({"brake": 6.0}, 4.0, "brake coil", 1.0),
+        ({"mill": 6.0, "fan": 2.0}, 0.0, "mill", 0.75), ({"mill": 6.0, "fan": 2.0}, 0.0, "fan", 0.25),
+        ({"mill": 6.0, "fan": 2.0}, 0.0, "", 1.0), ({"brake": 6.0}, 4.0, "", 0.6), ({"brake": 6.0}, 4.0, "brake", 0.6),
+        ({"brake": 6.0}, 4.0, "coil", 0.4), ({"brake": 6.0}, 4.0, "brake coil", 1.0),
     ],
-)
-def test_useful_work_is_that_of_what_is_marked_so(
-    torques: dict[str, float], spring: float, marked: str, share: float
-) -> None:
+)  # fmt: skip
+def test_useful_work_is_that_of_what_is_marked_so(torques, spring, marked, share):
     """Of torques on a shaft and of a spring that it winds up; all loads, and no spring, if nothing is marked."""
     loads = {name: {"joint": "A", "resisting_torque": size, "useful": name in marked} for name, size in torques.items()}
     springs = {"coil": {"joint": "A", "preload": spring, "useful": "coil" in marked}} if spring else {}
@@ -179,7 +167,7 @@ def test_useful_work_is_that_of_what_is_marked_so(
     np.testing.assert_allclose(useful / driven, share, rtol=1e-12)
 
 
-def test_power_residual_is_told_of_the_peak_power() -> None:
+def test_power_residual_is_told_of_the_peak_power():
     """Of the drive, or of whatever has the most where that has none; of no power at all as it is."""
     arrays = {"power_residual": np.array([1e-6, -4e-6, 2e-6]), "drive_power": np.array([[3.0, -8.0, 5.0]]),
               "useful_power": np.array([1.0, 2.0, 0.5])}  # fmt: skip
@@ -190,7 +178,7 @@ def test_power_residual_is_told_of_the_peak_power() -> None:
     assert balance(arrays | nothing, 0.0) == pytest.approx(4e-6)
 
 
-def test_root_mean_square_of_an_effort() -> None:
+def test_root_mean_square_of_an_effort():
     """Of a crank that lifts a weight the torque is m g r cos φ: its RMS m g r/√2."""
     crank = shaft({"speed": 2.0}, {"mass": 2.0, "centre": [0.3, 0], "inertia": 0.0}, gravity=[0, -9.81])
     (row,) = (row for row in summary_of(trunnion.analyse(crank, 12)) if row.aspect == "RMS")
@@ -200,7 +188,7 @@ def test_root_mean_square_of_an_effort() -> None:
 LIFTED, HELPED, HINDERED = 10.0, 4.0, 5.0  # J: constant forces, N, over a rise of 1 m
 
 
-def crank(**loads: float) -> list[Finding]:
+def crank(**loads):
     """The findings of a crank of 1 m, from level to upright; loads: vertical forces at its end, N; `weight` is useful;
     with `mass` a weight at its end that it lets down instead."""
     body = {"points": {"A": [0, 0], "P": [1, 0]}, "mass": loads.pop("mass", 0.0), "centre": [1, 0]}
@@ -211,7 +199,7 @@ def crank(**loads: float) -> list[Finding]:
     return [one for one in found if one.code in ("efficiency.above_one", "load.not_counted")]
 
 
-def test_an_efficiency_above_one_is_a_warning_with_the_work_of_each_source() -> None:
+def test_an_efficiency_above_one_is_a_warning_with_the_work_of_each_source():
     (one,) = crank(weight=-LIFTED, hand=HELPED)
     assert one.severity == "warning"
     assert one.code == "efficiency.above_one"
@@ -220,26 +208,26 @@ def test_an_efficiency_above_one_is_a_warning_with_the_work_of_each_source() -> 
     assert one.figures["work"] == pytest.approx({"load hand": HELPED}, rel=1e-9)
 
 
-def test_masses_that_help_are_a_source() -> None:
+def test_masses_that_help_are_a_source():
     (one,) = crank(weight=-LIFTED, mass=HELPED)
     assert one.figures["work"] == pytest.approx({"weight and inertia": HELPED}, rel=1e-9)
 
 
-def test_below_one_a_load_beside_the_drive_that_supplies_work_is_a_note() -> None:
+def test_below_one_a_load_beside_the_drive_that_supplies_work_is_a_note():
     (one,) = crank(weight=-LIFTED, hand=HELPED, scrap=-HINDERED)
     assert (one.code, one.where, one.severity) == ("load.not_counted", "loads.hand", "note")
     assert one.figures == pytest.approx({"work": HELPED, "drive": LIFTED - HELPED + HINDERED}, rel=1e-9)
 
 
 @pytest.mark.parametrize("loads", [{"weight": -LIFTED}, {"weight": -LIFTED, "scrap": -HINDERED}, {"hand": HELPED}])
-def test_nothing_is_said_where_the_drives_alone_supply_work(loads: dict[str, float]) -> None:
+def test_nothing_is_said_where_the_drives_alone_supply_work(loads):
     assert not crank(**loads)
 
 
 G, MASS = 9.81, 1500.0
 
 
-def lift(space: str, friction: float, weight: dict[str, Any], gravity: float) -> Mechanism:
+def lift(space, friction, weight, gravity):
     """A slider on an inclined guide, driven up it by a motion that begins and ends at rest."""
     flat = [0.0] if space == "spatial" else []
     centre = [0.1, 0.3, *flat]
@@ -260,7 +248,7 @@ def lift(space: str, friction: float, weight: dict[str, Any], gravity: float) ->
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 @pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_a_weight_is_useful_as_a_load_is(space: str, friction: float) -> None:
+def test_a_weight_is_useful_as_a_load_is(space, friction):
     one = trunnion.analyse(lift(space, friction, {"useful": True}, G), steps=20)
     other = trunnion.analyse(lift(space, friction, {}, 0.0), steps=20)
     for name in ("efficiency", "useful_power", "efficiency_instant"):
@@ -268,7 +256,7 @@ def test_a_weight_is_useful_as_a_load_is(space: str, friction: float) -> None:
     assert float(one.efficiency) == pytest.approx(1.0, rel=1e-9) if friction == 0 else 0.3 < float(one.efficiency) < 1
 
 
-def test_locking_counts_it() -> None:
+def test_locking_counts_it():
     """Backward the weight drives: the efficiency backward of an incline of 0.6 rad is 2 − 1/η, of useful weight too."""
     numbers = [
         {row["name"]: row["value"] for row in json.loads(trunnion.locking(model, steps=12).attrs["summary"])}
@@ -279,7 +267,7 @@ def test_locking_counts_it() -> None:
 
 
 @pytest.mark.parametrize(("times", "rough"), [(20, False), (3000, True)])
-def test_what_changes_too_finely_to_be_resolved_is_told(times: int, rough: bool) -> None:
+def test_what_changes_too_finely_to_be_resolved_is_told(times, rough):
     """A load that changes 20 times over the cycle is resolved; of one that changes 3000 times the share is told."""
     loads = {"work": {"joint": "S", "resisting_force": f"1 kN * (2 + sin({times} * drive))", "useful": True}}
     result = analyse(Mechanism(**{**PRESS, "loads": loads}), 7)

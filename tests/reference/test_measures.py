@@ -1,8 +1,5 @@
 """Measures and their figures against closed forms, published values and the books of `analyse`."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy import optimize
@@ -11,7 +8,7 @@ from scipy.spatial.transform import Rotation
 import trunnion
 from measured import figures
 from mechanisms import DURANGO, build, four_bar, slider_crank
-from mechanisms_parts import corner
+from mechanisms_parts import corner, example
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -19,9 +16,8 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import plan
 from trunnion.results.attributes import MORE_THAN, summary_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, E = 0.3, 1.0, 0.1  # crank, rod, offset of the guide
 
 STROKE = Measure("stroke", "stroke", "C")
@@ -31,7 +27,7 @@ RATIO = Measure("ratio", "time_ratio", "C")
 
 
 @pytest.fixture(scope="module")
-def crank() -> Run:
+def crank():
     data = slider_crank(R, L, E)
     data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N"}
     data["springs"] = {"coil": {"joint": "P", "stiffness": "20 N m/rad", "free_angle": 0}}
@@ -39,24 +35,24 @@ def crank() -> Run:
 
 
 @pytest.fixture(scope="module")
-def durango() -> Run:
+def durango():
     return prepare(trunnion.read(DURANGO))
 
 
-def stroke_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+def stroke_of(r=R, length=L, offset=E):
     """From both positions in which crank and rod are in line."""
     return np.sqrt((length + r) ** 2 - offset**2) - np.sqrt((length - r) ** 2 - offset**2)
 
 
-def far_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+def far_of(r=R, length=L, offset=E):
     return np.arcsin(offset / (length + r))
 
 
-def near_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+def near_of(r=R, length=L, offset=E):
     return np.pi + np.arcsin(offset / (length - r))
 
 
-def ratio_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+def ratio_of(r=R, length=L, offset=E):
     way = near_of(r, length, offset) - far_of(r, length, offset)
     return way / (2 * np.pi - way)
 
@@ -64,7 +60,7 @@ def ratio_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
 SIZES = {"links.crank.points.B.x": 0, "links.rod.points.P.x": 1, "links.ground.points.C.y": 2}
 
 
-def test_of_many_samples(crank: Run) -> None:
+def test_of_many_samples(crank):
     """The same closed forms with crank, rod and guide of every sample, and with driver speeds of their own."""
     rng = np.random.default_rng(3)
     r, length, offset = (n * (1 + 0.02 * rng.uniform(-1, 1, (50, 1))) for n in (R, L, E))
@@ -78,7 +74,7 @@ def test_of_many_samples(crank: Run) -> None:
 
 
 @pytest.mark.parametrize("path", SIZES)
-def test_derivatives_of_stroke_and_dead_centres(crank: Run, path: str) -> None:
+def test_derivatives_of_stroke_and_dead_centres(crank, path):
     """By dual numbers through the engine, the positions and the search for the extremes; against the closed forms."""
     sizes = np.array([R, L, E])
     found = figures(crank, [STROKE, FAR, NEAR, RATIO], 360, {path: Dual(sizes[SIZES[path]], 1.0)})
@@ -90,11 +86,11 @@ def test_derivatives_of_stroke_and_dead_centres(crank: Run, path: str) -> None:
 
 
 @pytest.mark.parametrize("pivots", [25, 90, 120 / 1.00025, 300])
-def test_time_ratio_of_a_quick_return(pivots: float) -> None:
+def test_time_ratio_of_a_quick_return(pivots):
     """Ram in line with the lever's pivot. Inside the crank's circle the lever turns right round (Whitworth) and stands
     along the guide at both ends of the shorter way, φ = 2 acos(d/r) of the crank; outside it rocks, φ = 2 acos(r/d).
     """
-    whitworth = trunnion.read(EXAMPLES / "whitworth-quick-return.yaml").with_values({"d": f"{pivots} mm"})
+    whitworth = example("whitworth-quick-return").with_values({"d": f"{pivots} mm"})
     short = 2 * np.arccos(min(pivots / 120, 120 / pivots))
     joint = "G" if pivots < 120 else "C"
     for law in ({"speed": "40 rpm"}, {"speed": "-3 rad/s", "start": "1 rad"}):
@@ -106,16 +102,16 @@ def test_time_ratio_of_a_quick_return(pivots: float) -> None:
         assert found["stroke"] == pytest.approx(stroke, rel=1e-8)
 
 
-def test_time_ratio_where_the_lever_goes_through_its_pivot() -> None:
+def test_time_ratio_where_the_lever_goes_through_its_pivot():
     """The crank as long as the pivots are apart: the lever jumps by half a turn, and there is no ratio."""
-    whitworth = trunnion.read(EXAMPLES / "whitworth-quick-return.yaml").with_values({"d": "120 mm"})
+    whitworth = example("whitworth-quick-return").with_values({"d": "120 mm"})
     assert np.isnan(figures(prepare(whitworth), [Measure("ratio", "time_ratio", "G")], 60)["ratio"])
 
 
 @pytest.mark.parametrize("short", [0.0, 1e-6])
-def test_time_ratio_of_a_slider_crank_that_can_just_turn(short: float) -> None:
+def test_time_ratio_of_a_slider_crank_that_can_just_turn(short):
     """φ = asin(e/(l − r)) − asin(e/(l + r)); as the offset e nears l − r the inner dead centre becomes a sharp one."""
-    offset = trunnion.read(EXAMPLES / "offset-slider-crank.yaml")
+    offset = example("offset-slider-crank")
     r, length = (offset.parameters()[f"dimensions.{name}"] for name in "rl")
     e = (length - r) * (1 - short) if short else 0.5 * (length - r)
     run = prepare(offset.with_values({"e": f"{float(e)!r} m"}))
@@ -126,7 +122,7 @@ def test_time_ratio_of_a_slider_crank_that_can_just_turn(short: float) -> None:
     assert found["stroke"] == pytest.approx(ends, rel=1e-8)
 
 
-def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
+def test_time_ratio_is_of_a_whole_turn(durango):
     """None of a crank that turns on, nor of a part of a turn; 197.80° and 162.20° of the four-bar."""
     ratio, round_ = Measure("ratio", "time_ratio", "D"), Measure("round", "time_ratio", "A")
     found = figures(durango, [ratio, round_], 720)
@@ -138,7 +134,7 @@ def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
     assert told.value is None
 
 
-def test_dead_centre_outside_its_window(durango: Run) -> None:
+def test_dead_centre_outside_its_window(durango):
     """14.361511563° and 212.157208609°, known to all digits; told from the end of a range, where the motion goes on."""
     inside = Measure("inside", "dead_centre", "D", over=(np.radians(180), np.radians(240)))
     outside = Measure("outside", "dead_centre", "D", over=(np.radians(220), np.radians(300)))
@@ -151,7 +147,7 @@ def test_dead_centre_outside_its_window(durango: Run) -> None:
     assert np.degrees(found["place"]) == pytest.approx(220, abs=1e-9)
 
 
-def test_rotation_over_whole_turns(durango: Run) -> None:
+def test_rotation_over_whole_turns(durango):
     """The crank gains a turn, from the first position to the end of the cycle; a window from 300° to 60° is 120°."""
     turn = Measure("turn", "rotation", "A", statistic="peak-to-peak")
     third = Measure("third", "rotation", "A", over=(np.radians(300), np.radians(60)), statistic="peak-to-peak")
@@ -160,7 +156,7 @@ def test_rotation_over_whole_turns(durango: Run) -> None:
     assert found["third"] == pytest.approx(np.radians(120), abs=1e-12)
 
 
-def test_deviation_and_path_error(crank: Run) -> None:
+def test_deviation_and_path_error(crank):
     """A guide that is 1 mm higher: the piston goes up by it, its slide changes with the angle of the rod."""
     raised = {"links.ground.points.C.y": np.array([[E + 1e-3], [E - 2e-3], [E]])}
     path = Measure("path", "path_error", "piston.P")
@@ -171,7 +167,7 @@ def test_deviation_and_path_error(crank: Run) -> None:
     np.testing.assert_allclose(found["height"], [1e-3, 2e-3, 0], rtol=0, atol=1e-15)
     q = np.linspace(0, 2 * np.pi, 100_001)
 
-    def x(offset: float) -> Any:
+    def x(offset):
         return R * np.cos(q) + np.sqrt(L**2 - (offset - R * np.sin(q)) ** 2)
 
     changes = [x(E + step) - x(E) for step in (1e-3, -2e-3, 0)]
@@ -181,7 +177,7 @@ def test_deviation_and_path_error(crank: Run) -> None:
     np.testing.assert_allclose(found["path"], away, rtol=0, atol=1e-12)
 
 
-def test_angles_over_the_cut(durango: Run) -> None:
+def test_angles_over_the_cut(durango):
     """Where an angle jumps from π to −π its deviation does not."""
     data = four_bar()
     for start in np.linspace(0, 2 * np.pi, 3, endpoint=False):
@@ -193,10 +189,10 @@ def test_angles_over_the_cut(durango: Run) -> None:
         assert min(np.min(number) for name, number in found.items() if name != "acrank") > 1e-4
 
 
-def width(x: Any, y: Any) -> float:
+def width(x, y):
     """Of a path about its least-squares line, found by search."""
 
-    def squares(angle: float) -> float:
+    def squares(angle):
         away = (y - np.mean(y)) * np.cos(angle) - (x - np.mean(x)) * np.sin(angle)
         return float(np.sum(away**2))
 
@@ -204,9 +200,9 @@ def width(x: Any, y: Any) -> float:
     return float(np.ptp((y - np.mean(y)) * np.cos(best) - (x - np.mean(x)) * np.sin(best)))
 
 
-def test_straightness_of_hoeckens_line() -> None:
+def test_straightness_of_hoeckens_line():
     """Over the half turn of the crank in which it is nearly straight, by circles intersected at many places."""
-    run = prepare(trunnion.read(EXAMPLES / "hoecken.yaml"))
+    run = prepare(example("hoecken"))
     half = Measure("half", "straightness", "coupler.P", over=(np.pi / 2, 3 * np.pi / 2))
     part = Measure("part", "straightness", "coupler.P", over=(np.radians(100), np.radians(233.3)))
     found = figures(run, [half, part], 720)
@@ -216,7 +212,7 @@ def test_straightness_of_hoeckens_line() -> None:
         assert found[name] == pytest.approx(width(point.real, point.imag), rel=2e-4)
 
 
-def test_straightness_of_a_circle_and_of_a_line(crank: Run) -> None:
+def test_straightness_of_a_circle_and_of_a_line(crank):
     """As wide as it is long; and the path of the piston, which is straight."""
     pin = Measure("pin", "straightness", "crank.B")
     found = figures(crank, [pin, Measure("piston", "straightness", "piston.P")], 90)
@@ -224,7 +220,7 @@ def test_straightness_of_a_circle_and_of_a_line(crank: Run) -> None:
     assert found["piston"] == pytest.approx(0, abs=1e-15)
 
 
-def test_derivative_of_a_straightness() -> None:
+def test_derivative_of_a_straightness():
     """By dual numbers and by two figures, in the plane and of the same mechanism in space."""
     run = prepare(build(four_bar()))
     path = "links.coupler.points.C.x"
@@ -234,9 +230,9 @@ def test_derivative_of_a_straightness() -> None:
     assert slope == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-6)
 
 
-def test_straightness_in_space() -> None:
+def test_straightness_in_space():
     """A path in a plane of space is as straight as in the plane, if it lies evenly about its line."""
-    run = prepare(trunnion.read(EXAMPLES / "fourbar-in-space.yaml"))
+    run = prepare(example("fourbar-in-space"))
     link, point = next((link, point) for link, point in run.system.points if link != run.system.mechanism.fixed_link)
     found = figures(run, [Measure("line", "straightness", f"{link}.{point}")], 180)["line"]
     times = run.cycle.times(180)
@@ -248,7 +244,7 @@ def test_straightness_in_space() -> None:
 
 
 @pytest.mark.slow
-def test_locking_margin() -> None:
+def test_locking_margin():
     """The least of the analysis to where it is looked for; no derivative, rather than a silent 0."""
     run = prepare(build(slider_crank(R, L, E), friction=0.4, radius=0.08))
     least = float(np.nanmin(trunnion.locking(run.system.mechanism, 90)["locking_margin"].values))
@@ -262,7 +258,7 @@ def test_locking_margin() -> None:
 
 
 @pytest.mark.slow
-def test_a_locking_margin_beyond_what_is_looked_for_is_infinite() -> None:
+def test_a_locking_margin_beyond_what_is_looked_for_is_infinite():
     """In a result, a sweep and samples; the summary says "more than"; its place does not exist."""
     statistics = ["minimum", "mean", "place-of-minimum"]
     measures = {name: {"locking_margin": "mechanism", "as": name} for name in statistics}
@@ -282,7 +278,7 @@ def test_a_locking_margin_beyond_what_is_looked_for_is_infinite() -> None:
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-7])
-def test_turn_of_a_link_in_space(scale: float) -> None:
+def test_turn_of_a_link_in_space(scale):
     """About each global axis the component of the rotation vector from the nominal attitude, however far it is."""
     run = prepare(Mechanism(**rssr().data))
     link = next(name for name in run.system.mechanism.links if run.system.mechanism.drivers and "rocker" in name)
@@ -309,7 +305,7 @@ def test_turn_of_a_link_in_space(scale: float) -> None:
         assert float(np.ravel(derivative(slopes[axis]))[0]) == pytest.approx(slope, rel=1e-6, abs=1e-7)
 
 
-def test_place_of_a_law_that_is_not_steady() -> None:
+def test_place_of_a_law_that_is_not_steady():
     """The time at which a rise has a coordinate, and the coordinate at which the slide is shortest."""
     rise = {"law": "cycloidal", "range": [2.0, 4.4], "duration": 2.0, "returns": False}
     run = prepare(build({**slider_crank(R, L, E), "drivers": {"A": rise}}))

@@ -1,16 +1,13 @@
 """Motion in time against closed forms, published solutions and MuJoCo: motors, clutches, controllers, linkages."""
 
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from test_known_linkages import ANGLES, START
 
-from mechanisms import Array
-from mechanisms_parts import joined
+from mechanisms_parts import EXAMPLES, joined
 from reference.mujoco_engine import Engine, mj
 from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
 from trunnion import analyse, read, simulate
@@ -20,17 +17,15 @@ from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 from trunnion.views.motion import ENERGIES
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
-
-def at(result: Any, name: str, time: float, driver: int = 0) -> float:
+def at(result, name, time, driver=0):
     """A number of the result at one of its times."""
     row = int(np.argmin(np.abs(result["time"].values - time)))
     assert result["time"].values[row] == pytest.approx(time, abs=1e-12)
     return float(result[name].values[driver, row])
 
 
-def events(result: Any, kind: str) -> list[float]:
+def events(result, kind):
     rows = attribute(result, "events")
     return [float(t) for row, t in zip(rows, result["event_time"].values, strict=True) if row[0] == kind]
 
@@ -38,7 +33,7 @@ def events(result: Any, kind: str) -> list[float]:
 # ---- a flywheel: closed forms of THEORY 8 -----------------------------------------------------------------------
 
 
-def test_a_run_down_is_told_from_where_the_motor_is_switched_off() -> None:
+def test_a_run_down_is_told_from_where_the_motor_is_switched_off():
     """From 127.5 rad/s at 0.6 N m: J ω/T = 10.625 s and J ω²/(2 T) after the switch; the start adds nothing."""
     switched = wheel({**LINEAR, "off_from": 0.5}, initial={"speed": 127.5})
     told = {one.name: one.value for one in simulate(switched, 12.0, 2, 1e-11).trunnion.summary}
@@ -48,7 +43,7 @@ def test_a_run_down_is_told_from_where_the_motor_is_switched_off() -> None:
     assert "A.run_down" not in {one.name for one in stalled.trunnion.summary}
 
 
-def test_a_direct_current_motor_starts_a_flywheel() -> None:
+def test_a_direct_current_motor_starts_a_flywheel():
     """ω = 127.5 (1 − e^(−t/1.875))."""
     result = simulate(wheel(LINEAR), 5.0, 5, 1e-12)
     assert at(result, "drive_rate", 1.0) == pytest.approx(52.70260701247094, rel=1e-10)
@@ -60,7 +55,7 @@ def test_a_direct_current_motor_starts_a_flywheel() -> None:
     ("grease", "time", "angle"),
     [(0.0, 10.625, 107.80260598490099 * 2 * np.pi), (0.004, 7.689820488627919, 440.27692670581223)],
 )
-def test_a_flywheel_runs_down(grease: float, time: float, angle: float) -> None:
+def test_a_flywheel_runs_down(grease, time, angle):
     """Under a constant torque, and under one that grows with the speed as well."""
     result = simulate(wheel(None, 0.6, grease, initial={"speed": 127.5}), 12.0, 12, 1e-12)
     assert events(result, "rest") == [pytest.approx(time, rel=1e-10)]
@@ -69,7 +64,7 @@ def test_a_flywheel_runs_down(grease: float, time: float, angle: float) -> None:
     assert result["resting"].values[-1] == 1
 
 
-def test_an_induction_motor_runs_up_by_kloss() -> None:
+def test_an_induction_motor_runs_up_by_kloss():
     """Without a load the time to a slip is J ω_s/(2 T_k) ∫ (s/s_k + s_k/s) ds."""
     motor = {"kind": "induction", "breakdown_effort": 20, "breakdown_slip": 0.2, "synchronous_speed": 50 * np.pi}
     for time, slip in zip(np.array([0.39537521522134894, 0.5344413770648673]), (0.5, 0.2), strict=True):
@@ -78,13 +73,13 @@ def test_an_induction_motor_runs_up_by_kloss() -> None:
 
 
 @pytest.mark.slow
-def test_a_motor_too_weak_stalls() -> None:
+def test_a_motor_too_weak_stalls():
     """It gets slower by (0.6 − 0.5) N m/J and stops for good; a motor switched off, braked, or of no torque by then
     does not stall, nor does one that breaks away again."""
 
     constant = {"kind": "constant", "effort": 0.5}
 
-    def codes(**motor: Any) -> dict[str, dict[str, Any]]:
+    def codes(**motor):
         own = {"kind": "table", "over": "time", **motor} if "points" in motor else constant | motor
         result = simulate(wheel(own, initial={"speed": 2.0}), 2.0, 4, 1e-11)
         return {one.code: one.figures for one in result.trunnion.findings}
@@ -98,7 +93,7 @@ def test_a_motor_too_weak_stalls() -> None:
     assert not codes(points=[[0, 0.5], [1.4, 0.5], [1.5, 1]])
 
 
-def test_a_gear_a_rotor_and_a_loss() -> None:
+def test_a_gear_a_rotor_and_a_loss():
     """(J + i² J_r η) ω̇ = i η T − T_f: ω = ω∞ (1 − e^(−t/τ))."""
     result = simulate(wheel({**LINEAR, "ratio": 3, "efficiency": 0.9, "inertia": 0.002}), 0.5, 1, 1e-12)
     whole = 0.05 + 9 * 0.002 * 0.9
@@ -106,7 +101,7 @@ def test_a_gear_a_rotor_and_a_loss() -> None:
     assert at(result, "drive_rate", 0.5) == pytest.approx(start / slope * (1 - np.exp(-slope * 0.5 / whole)), rel=1e-10)
 
 
-def test_the_loss_of_a_gear_turns_round_with_the_power() -> None:
+def test_the_loss_of_a_gear_turns_round_with_the_power():
     """Above its no-load speed the motor brakes, through the same gear: the mechanism overcomes the loss as well."""
     motor = {**LINEAR, "ratio": 1, "efficiency": 0.8}
     result = simulate(wheel(motor, drag=0.0, initial={"speed": 200.0}), 0.2, 1, 1e-12)
@@ -115,7 +110,7 @@ def test_the_loss_of_a_gear_turns_round_with_the_power() -> None:
     assert at(result, "drive_rate", 0.2) == pytest.approx(wanted, rel=1e-10)
 
 
-def test_switched_off_and_braked() -> None:
+def test_switched_off_and_braked():
     """Constant torques: two straight lines in the speed, and a stop at a known time."""
     motor = {"kind": "constant", "effort": 4, "off_from": 1.0, "brake": 2.0, "brake_from": 1.5}
     result = simulate(wheel(motor), 4.0, 8, 1e-11)
@@ -131,7 +126,7 @@ def test_switched_off_and_braked() -> None:
     assert figures[2] == [2.0, "N m"]
 
 
-def test_a_table_over_time_breaks_a_wheel_away() -> None:
+def test_a_table_over_time_breaks_a_wheel_away():
     """The torque grows evenly; it breaks away where it gets to that of the load."""
     motor = {"kind": "table", "over": "time", "points": [[0, 0], [2, 4]]}
     result = simulate(wheel(motor), 1.0, 1, 1e-11)
@@ -140,21 +135,21 @@ def test_a_table_over_time_breaks_a_wheel_away() -> None:
     assert at(result, "drive_rate", 1.0) == pytest.approx(since**2 / 0.05, rel=1e-7)
 
 
-def test_a_speed_control_holds_the_speed() -> None:
+def test_a_speed_control_holds_the_speed():
     """J ω̈ = −K_p ω̇ − K_i (ω − ω*) beside the constant load: known roots, while the limit is not reached."""
     motor = {"kind": "speed-control", "target": 10, "proportional": 0.5, "integral": 2.0, "limit": 100}
     result = simulate(wheel(motor), 3.0, 3, 1e-11)
     matrix = np.array([[0, 1, 0], [0, -10, 40], [0, -1, 0]])  # q, ω, ∫
     constant = np.array([0, (0.5 * 10 - 0.6) / 0.05, 10])
 
-    def rate(_: float, y: np.ndarray) -> np.ndarray:
+    def rate(_, y):
         return np.asarray(matrix @ y + constant)
 
     wanted = solve_ivp(rate, (0, 3), np.zeros(3), rtol=1e-12, atol=1e-12, method="DOP853")
     assert at(result, "drive_rate", 3.0) == pytest.approx(wanted.y[1, -1], rel=1e-8)
 
 
-def test_a_controller_on_the_brink_breaks_the_wheel_away_at_once() -> None:
+def test_a_controller_on_the_brink_breaks_the_wheel_away_at_once():
     """K_p ω* is what the loss holds, and ∫ grows: J ω̈ + K_p ω̇ + K_i ω = K_i ω* from rest at t = 0."""
     motor = {"kind": "speed-control", "target": 100, "proportional": 0.006, "integral": 1e-6, "limit": 5}
     result = simulate(wheel(motor), 2.0, 4, 1e-11)
@@ -170,7 +165,7 @@ def test_a_controller_on_the_brink_breaks_the_wheel_away_at_once() -> None:
 
 
 @pytest.mark.slow
-def test_three_posts_pass_poses_with_all_rods_in_line() -> None:
+def test_three_posts_pass_poses_with_all_rods_in_line():
     """IFToMM A02 by its own equation, 3 θ″ = −3.5 g cos θ (THEORY 8), twice through the singular pose."""
     result = simulate(three_posts(), 2.0, 2, 1e-11)
     assert at(result, "drive_coordinate", 1.0) == pytest.approx(-1.7670744763, abs=1e-8)
@@ -179,7 +174,7 @@ def test_three_posts_pass_poses_with_all_rods_in_line() -> None:
     assert at(result, "drive_rate", 2.0) == pytest.approx(-1.0189645914, abs=1e-8)
 
 
-def test_andrews_squeezer_in_time() -> None:
+def test_andrews_squeezer_in_time():
     """Published angles after 0.03 s from rest under 0.033 N m: the example as it is."""
     result = simulate(read(EXAMPLES / "andrews-squeezer-in-time.yaml"), 0.03, 1, 1e-12)
     links = result["link_angle"].sel(link=["K1", "K2", "K3", "K4", "K5", "K6", "K7"]).values
@@ -195,7 +190,7 @@ def test_andrews_squeezer_in_time() -> None:
 
 
 @pytest.mark.slow
-def test_a_mass_on_a_belt_sticks_and_slips() -> None:
+def test_a_mass_on_a_belt_sticks_and_slips():
     """Slip 2/ω (π − atan(ω Δ/v)), stick 2 Δ/v, Δ = (F_s − F_k)/k (THEORY 8); from rest where the spring is free."""
     result = simulate(mass_on_a_belt(), 1.0, 10, 1e-10)
     (first, second), (_, stop) = events(result, "break-away"), events(result, "rest")
@@ -206,7 +201,7 @@ def test_a_mass_on_a_belt_sticks_and_slips() -> None:
 
 
 @pytest.mark.slow
-def test_a_feed_works_on_the_spring_of_a_carriage_at_rest() -> None:
+def test_a_feed_works_on_the_spring_of_a_carriage_at_rest():
     """At rest the nut stretches the screw, F₀ + k v t, from 20 N on: its work is ∫ F v dt, all of it in the spring."""
     result = simulate(read(EXAMPLES / "stick-slip-drive.yaml"), 0.19, 19)
     way = 5e-3 * result["time"].values
@@ -216,7 +211,7 @@ def test_a_feed_works_on_the_spring_of_a_carriage_at_rest() -> None:
 
 
 @pytest.mark.slow
-def test_a_pulled_mass_with_bristles() -> None:
+def test_a_pulled_mass_with_bristles():
     """Canudas de Wit's experiment, the end of the spring moved by a prescribed driver: place after several slips."""
     result = simulate(pulled_mass(), 25.0, 1, 1e-8)
     assert at(result, "drive_coordinate", 25.0) == pytest.approx(1.908839199, abs=1e-7)
@@ -230,7 +225,7 @@ def test_a_pulled_mass_with_bristles() -> None:
 
 
 @pytest.mark.slow
-def test_a_huge_flywheel_runs_as_the_analysis_prescribes() -> None:
+def test_a_huge_flywheel_runs_as_the_analysis_prescribes():
     """The difference of the efforts of a turn at constant speed falls as 1/J."""
     data = slider_crank().data()
     misses = []
@@ -250,7 +245,7 @@ def test_a_huge_flywheel_runs_as_the_analysis_prescribes() -> None:
     assert misses[0] / misses[1] == pytest.approx(10.0, rel=0.05)
 
 
-def test_a_short_load_in_time_is_not_stepped_over() -> None:
+def test_a_short_load_in_time_is_not_stepped_over():
     """10 N m for 20 ms turn 2 into 4 rad/s, far from the start and at rest alike."""
     data = wheel(None, drag=0.0, initial={"speed": 2.0}).data()
     data["links"]["wheel"]["inertia"] = 0.1
@@ -258,7 +253,7 @@ def test_a_short_load_in_time_is_not_stepped_over() -> None:
     assert at(simulate(Mechanism(**data), 10.0, 10), "drive_rate", 10.0) == pytest.approx(4.0, rel=1e-9)
 
 
-def test_a_gear_that_cannot_be_driven_back_holds_its_load() -> None:
+def test_a_gear_that_cannot_be_driven_back_holds_its_load():
     """Between η T and T/η of the load the motor neither lifts nor lowers it."""
     data = wheel({"kind": "constant", "effort": 1.0, "efficiency": 0.5}, drag=0.0).data()
     for moment, moves in ((-0.4, True), (-0.6, False), (-1.9, False), (-2.1, True)):
@@ -266,7 +261,7 @@ def test_a_gear_that_cannot_be_driven_back_holds_its_load() -> None:
         assert (at(simulate(Mechanism(**data), 1.0, 4), "drive_rate", 1.0) != 0.0) == moves
 
 
-def test_a_controller_does_not_wind_up_at_rest() -> None:
+def test_a_controller_does_not_wind_up_at_rest():
     """While the limit holds it at rest its integral stays where the limit holds it."""
     motor = {"kind": "speed-control", "target": 10, "proportional": 0.02, "integral": 0.05, "limit": 0.5}
     result = simulate(wheel(motor, drag=0.6), 20.0, 4)
@@ -276,7 +271,7 @@ def test_a_controller_does_not_wind_up_at_rest() -> None:
     assert most == pytest.approx(0.5, rel=1e-14)  # the limit itself, though the effort bends there
 
 
-def test_a_controller_does_not_wind_up_while_its_limit_holds() -> None:
+def test_a_controller_does_not_wind_up_while_its_limit_holds():
     """It starts at its limit, ω = (5 − 0.6)/0.05 t, and there the integral grows as fast as the speed makes up for it.
 
     From where the limit lets go the integral is known, so that what follows is an initial value problem of its own.
@@ -298,7 +293,7 @@ MOVING = {"andrews-squeezer-in-time": 0.03, "flywheel-press": 3.0, "landing-gear
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("example", MOVING)
-def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
+def test_the_account_of_the_examples_as_they_begin(example):
     """Works and energies agree to 1e-8 of the largest of them that is turned over."""
     result = simulate(read(EXAMPLES / f"{example}.yaml"), MOVING[example], 200)
     accounts = [result[name] for name, _ in ENERGIES if name in result]
@@ -307,28 +302,28 @@ def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
 
 WHEEL_INERTIA = 0.05  # kg m², of `timed.wheel`
 ROTOR_INERTIA = 0.02
-RUN_UP: dict[str, Any] = {"kind": "constant", "effort": 4, "off_from": 0.5, "inertia": ROTOR_INERTIA}
+RUN_UP = {"kind": "constant", "effort": 4, "off_from": 0.5, "inertia": ROTOR_INERTIA}
 
 
-def kinds_of(result: Any) -> list[tuple[str, float]]:
+def kinds_of(result):
     rows = attribute(result, "events")
     return [(row[0], float(time)) for row, time in zip(rows, result["event_time"].values, strict=True)]
 
 
-def last(result: Any, name: str) -> float:
+def last(result, name):
     return float(np.ravel(result[name].values)[-1])
 
 
-def balanced(result: Any, turned_over: float) -> None:
+def balanced(result, turned_over):
     assert float(np.max(np.abs(result["energy_residual"].values))) < 1e-8 * abs(turned_over)
 
 
-def loaded(motor: dict[str, Any], moment: str) -> Mechanism:
+def loaded(motor, moment):
     """The wheel under a moment that changes with time."""
     return Mechanism(**wheel(motor, drag=0.0).data() | {"loads": {"work": {"link": "wheel", "moment": moment}}})
 
 
-def test_two_inertias_join() -> None:
+def test_two_inertias_join():
     """By momentum, with the wheel seen through the gear; ½ J₁ J₂/(J₁ + J₂) Δω² is lost in the clutch."""
     ratio = 2.0
     motor = {**RUN_UP, "ratio": ratio, "clutch": 3, "clutch_from": 0.6}
@@ -346,7 +341,7 @@ def test_two_inertias_join() -> None:
     balanced(result, lost)
 
 
-def test_before_it_engages_they_move_apart() -> None:
+def test_before_it_engages_they_move_apart():
     """The rotor by its motor alone, the wheel by its drag; so they do after it opens, with nothing lost in it."""
     motor = {**RUN_UP, "clutch": 50, "clutch_from": 0.0, "clutch_until": 0.25}
     result = simulate(wheel(motor, initial={"speed": 10.0}), 1.0, 4, 1e-11)
@@ -359,7 +354,7 @@ def test_before_it_engages_they_move_apart() -> None:
     assert last(result, "work_clutch") == 0.0
 
 
-def test_an_overload_makes_it_slip() -> None:
+def test_an_overload_makes_it_slip():
     """T − J₁ (T − L)/(J₁ + J₂) reaches C under L = a t; from then on the slip is a (t − t*)²/(2 J₂)."""
     effort, most, slope = 4.0, 5.0, 10.0
     result = simulate(loaded({**RUN_UP, "off_from": 5, "clutch": most}, "-10 N m/s * time"), 1.5, 3, 1e-11)
@@ -374,7 +369,7 @@ def test_an_overload_makes_it_slip() -> None:
     balanced(result, last(result, "work_drive"))
 
 
-def test_after_an_overload_it_holds_again() -> None:
+def test_after_an_overload_it_holds_again():
     """A load that swings: the clutch slips and holds in turn, and every stretch of slip loses C ∫ s dt."""
     motor = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150, "inertia": ROTOR_INERTIA, "clutch": 2.5}
     result = simulate(loaded(motor, "-6 N m * sin(8 rad/s * time)"), 3.0, 30_000, 1e-10)
@@ -390,7 +385,7 @@ def test_after_an_overload_it_holds_again() -> None:
     balanced(result, last(result, "work_drive"))
 
 
-def test_the_rotor_turns_while_the_load_holds_the_mechanism() -> None:
+def test_the_rotor_turns_while_the_load_holds_the_mechanism():
     """1 N m comes through the clutch, 3 N m are needed: the wheel rests, and the rotor gets faster by 3 N m."""
     result = simulate(wheel({**RUN_UP, "clutch": 1}, drag=3.0), 0.4, 4, 1e-11)
     assert np.all(result["drive_rate"].values == 0.0)
@@ -402,7 +397,7 @@ def test_the_rotor_turns_while_the_load_holds_the_mechanism() -> None:
     balanced(result, last(result, "work_clutch"))
 
 
-def crank(duration: float, **clutch: Any) -> Any:
+def crank(duration, **clutch):
     motor = {"kind": "linear", "stall_effort": 6, "no_load_speed": 100, "inertia": 0.01, "efficiency": 0.9, **clutch}
     data = slider_crank().data()
     data["drivers"]["O"]["motor"] = motor
@@ -410,7 +405,7 @@ def crank(duration: float, **clutch: Any) -> Any:
 
 
 @pytest.mark.slow
-def test_a_clutch_that_never_slips_is_none() -> None:
+def test_a_clutch_that_never_slips_is_none():
     """With friction, a gear's loss and a start from rest."""
     plain, other = crank(0.1), crank(0.1, clutch=100)
     assert other["drive_rate"].values == pytest.approx(plain["drive_rate"].values, rel=1e-8)
@@ -418,7 +413,7 @@ def test_a_clutch_that_never_slips_is_none() -> None:
     assert "work_clutch" not in plain
 
 
-def test_motions_with_a_clutch_are_taken_one_by_one() -> None:
+def test_motions_with_a_clutch_are_taken_one_by_one():
     """Among samples of the capacity: the peak effort is that capacity where it slips."""
     motor = {"kind": "linear", "stall_effort": 9, "no_load_speed": 100, "inertia": ROTOR_INERTIA, "clutch": 6}
     run = prepare(wheel(motor))
@@ -429,7 +424,7 @@ def test_motions_with_a_clutch_are_taken_one_by_one() -> None:
 
 STALL, NO_LOAD, ROTOR, PULL = 8.0, 157.0, 1e-3, 40.0  # N m, rad/s, kg m², N
 AXIS = {"at": [0, 0], "axis": [1, 0]}
-SLIDER_CRANK: dict[str, Any] = {  # a slider-crank; the flywheel is in the crank's inertia
+SLIDER_CRANK = {  # a slider-crank; the flywheel is in the crank's inertia
     "gravity": [0, -9.81],
     "links": {
         "ground": {"points": {"O": [0, 0], "S": AXIS}},
@@ -443,7 +438,7 @@ SLIDER_CRANK: dict[str, Any] = {  # a slider-crank; the flywheel is in the crank
 }
 
 
-def by_engine(start: tuple[float, float], times: Array) -> Array:
+def by_engine(start, times):
     """Crank angle and rate at some times, (2, time)."""
     engine = Engine(SLIDER_CRANK, 0.0, 1.0)
     lean = -np.arcsin(0.035 / 0.12 * np.sin(start[0]))  # of the rod, which tells the assembly
@@ -451,7 +446,7 @@ def by_engine(start: tuple[float, float], times: Array) -> Array:
     for name, dof in engine.dof.items():
         q[dof] = engine.sense[name] * guesses.get(name, 0.0)
 
-    def rate(_: float, y: Array) -> list[float]:
+    def rate(_, y):
         engine.move(q, [(float(y[0]), float(y[1]))])
         q[:] = engine.state.qpos
         along = np.linalg.solve(engine.rows(), np.eye(engine.size)[-1])  # B: of a unit rate of the driver
@@ -466,7 +461,7 @@ def by_engine(start: tuple[float, float], times: Array) -> Array:
     return np.asarray(found.y)
 
 
-def test_a_start_with_a_motor_is_mujocos() -> None:
+def test_a_start_with_a_motor_is_mujocos():
     """From rest 1 rad from the dead centre: angle and rate to 1e-6."""
     motor = {"kind": "linear", "stall_effort": STALL, "no_load_speed": NO_LOAD, "inertia": ROTOR}
     driver = {"O": {"speed": 100, "start": 1.0, "motor": motor}}

@@ -1,14 +1,11 @@
 """Whole mechanisms in MuJoCo, which has a motion and forces of its own; in space without friction."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 import pytest
 
 import mechanisms_space
 from brief import brief
-from mechanisms import MODELS, Array, Data, build, model
+from mechanisms import MODELS, build, model
 from reference.maximal_space import Drive, published, unrolled
 from reference.mujoco_engine import Engine as PlanarEngine
 from reference.mujoco_space import Engine, quaternion
@@ -19,12 +16,12 @@ STEPS = 24
 RADIUS, GUIDE = 0.01, 0.4  # of all pins, length of all guides, m
 
 
-def here(number: Any, i: int) -> float:
+def here(number, i):
     """The number of one of the positions."""
     return float(np.broadcast_to(number, (STEPS,))[i])
 
 
-def guess(run: Any, back: Any, engine: PlanarEngine, i: int) -> Array:
+def guess(run, back, engine, i):
     """Tree coordinates of one position, rounded, which tells the assembly."""
     q = np.zeros(engine.size)
     for name, dof in engine.dof.items():
@@ -36,7 +33,7 @@ def guess(run: Any, back: Any, engine: PlanarEngine, i: int) -> Array:
     return q
 
 
-def compared(run: Any, back: Any, engine: PlanarEngine, i: int, friction: float) -> Iterator[tuple[str, Any, Any]]:
+def compared(run, back, engine, i, friction):
     """What is compared in one position: its kind, Trunnion's numbers, MuJoCo's."""
     for link, point in run.system.points:
         if link == "ground":
@@ -61,18 +58,18 @@ def compared(run: Any, back: Any, engine: PlanarEngine, i: int, friction: float)
 @pytest.mark.spread(4)
 @pytest.mark.parametrize("friction", [0.0, 0.15])
 @pytest.mark.parametrize("name", [name for name, data in MODELS.items() if "gears" not in data()])
-def test_in_the_plane(name: str, friction: float) -> None:
+def test_in_the_plane(name, friction):
     """Motion and, without friction, forces to 1e-12 of the largest of their kind; with friction forces to 1e-8.
 
     Reached: 8e-14, and 1e-9 with friction, whose iteration ends where no normal load changes by more than 1e-8.
     """
-    options: Data = {"friction": friction, "radius": RADIUS, "guide": GUIDE}
+    options = {"friction": friction, "radius": RADIUS, "guide": GUIDE}
     run = prepare(build(MODELS[name](), **options))
     engine = PlanarEngine(model(MODELS[name](), **options), RADIUS, GUIDE)
     time = (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
     back = run.solve(time)
     drives = [run.system.drive(run.values, driver, time) for driver in engine.drivers]
-    pairs: dict[str, list[Array]] = {}
+    pairs = {}
     for i in range(STEPS):
         engine.move(guess(run, back, engine, i), [(float(q[i]), float(rate)) for q, rate, _ in drives])
         for kind, ours, theirs in compared(run, back, engine, i, friction):
@@ -92,14 +89,14 @@ IN_SPACE = [
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", IN_SPACE)
-def test_in_space(name: str) -> None:
+def test_in_space(name):
     """Motion and forces without friction to 1e-11 of the largest of their kind; no free spin needs a moment."""
     data = mechanisms_space.with_friction(name, False)
     result, engine = brief(Mechanism(**data), 9), Engine(unrolled(data))
     ways = {name: "slide" if joint["type"] == "prismatic" else "rotation" for name, joint in engine.joints.items()}
     for i in range(9):
 
-        def given(variable: str, i: int = i, **where: str) -> Array:
+        def given(variable, i=i, **where):
             return np.asarray(result[variable].sel(**where).values[..., i], float)
 
         frames = {link: published(result, link, i) for link in engine.oracle.moving}

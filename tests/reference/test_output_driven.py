@@ -1,7 +1,6 @@
 """Motion stated at one joint, effort at another: against closed forms, virtual work and the way in two runs."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,12 +14,12 @@ from trunnion.algebra.dual import Dual, derivative
 from trunnion.solve.run import prepare
 
 R, L = 0.03, 0.2  # crank and rod of a press, m
-RAM: dict[str, Any] = {"law": "cycloidal", "range": ["180 mm", "225 mm"], "duration": "0.5 s", "dwell": "0.1 s"}
+RAM = {"law": "cycloidal", "range": ["180 mm", "225 mm"], "duration": "0.5 s", "dwell": "0.1 s"}
 
 
-def press(drivers: dict[str, Any], friction: float = 0.1, **more: Any) -> Mechanism:
+def press(drivers, friction=0.1, **more):
     """A crank press: the crank's pin O, the ram's guide S."""
-    data: dict[str, Any] = {
+    data = {
         "gravity": [0, -9.81],
         "links": {
             "frame": {"points": {"O": [0, 0], "S": slide(0, 0)}},
@@ -37,7 +36,7 @@ def press(drivers: dict[str, Any], friction: float = 0.1, **more: Any) -> Mechan
     return Mechanism(**{**data, **more})
 
 
-def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
+def test_the_crank_of_a_ram_that_moves_by_a_law():
     """cos θ = (s² + r² − l²)/(2 r s), differentiated along the motion of the ram."""
     own = prepare(press({"O": {"moves": "S", **RAM}}))
     ram = prepare(press({"S": RAM}))
@@ -55,7 +54,7 @@ def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
 
 
 @pytest.mark.parametrize(("example", "driver", "moved"), [("watt-six-bar", "", ""), ("four-bar", "A", "D")])
-def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str, moved: str) -> None:
+def test_power_is_the_same_at_whatever_joint_it_enters(example, driver, moved):
     """Without friction the effort times the rate of the driver is that of a driver at the joint that moves."""
     data = four_bar() if example == "four-bar" else trunnion.read(f"examples/{example}.yaml").data()
     data["joint_defaults"] = {}
@@ -83,12 +82,12 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
     )
 
 
-def test_a_hand_that_two_drivers_move() -> None:
+def test_a_hand_that_two_drivers_move():
     """Two cranks A and D, two rods to a hand, led along two slides: the motors' power is that of forces at the hand."""
     x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
     bars = {"left": ("A", "B", 0.4, 0.15), "right": ("D", "C", 0.4, 0.15), "rod": ("B", "H", 0.3, 0.18),
             "other": ("C", "J", 0.3, 0.18)}  # fmt: skip
-    links: dict[str, Any] = {
+    links = {
         one: {"points": {near: [0, 0], far: [length, 0]}, "mass": mass, "centre": [length / 2, 0], "inertia": 1e-3}
         for one, (near, far, mass, length) in bars.items()
     }
@@ -112,7 +111,7 @@ def test_a_hand_that_two_drivers_move() -> None:
         np.testing.assert_allclose(*slides, atol=1e-12)
 
 
-def test_past_a_dead_centre_there_is_no_position() -> None:
+def test_past_a_dead_centre_there_is_no_position():
     """A ram that turns a crank: past its dead centre the same place of the ram is another of the crank."""
     turning = {"moves": "O", "start": "30 deg", "speed": "60 rpm"}
     engine = press({"S": turning}, friction=0.0, loads={}, assembly={"O": "30 deg", "P": [0.026, 0.015]})
@@ -126,11 +125,11 @@ def test_past_a_dead_centre_there_is_no_position() -> None:
     assert "assembly.past_dead_centre" in codes
 
 
-def test_its_derivatives_are_those_of_differences() -> None:
+def test_its_derivatives_are_those_of_differences():
     run = prepare(press({"O": {"moves": "S", **RAM}}))
     path, time = "links.crank.points.P.x", np.linspace(0.05, 0.45, 9)
 
-    def efforts(radius: Any) -> Any:
+    def efforts(radius):
         return run.solve(time, {**run.values, path: radius}).efforts["O"]
 
     slope = (efforts(R + 1e-7) - efforts(R - 1e-7)) / 2e-7

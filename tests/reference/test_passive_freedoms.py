@@ -1,21 +1,17 @@
 """Struts between balls, pads under balls: their spins move nothing else, and statics says what they carry."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from brief import brief, judged
 from mechanisms_parts import joined
 from trunnion import Mechanism, MechanismError, analyse
 
-Array = NDArray[np.float64]
 UPPER, LOWER = [0.1, 0.3, 0.8], [0.5, 0.05, 0.1]
 
 
-def arm() -> Mechanism:
+def arm():
     """An arm on a hinge, held by a spring between the same points as a strut would be."""
     hinge = {"at": [0, 0, 0], "axis": [0, 1, 0]}
     return Mechanism(
@@ -32,11 +28,11 @@ def arm() -> Mechanism:
     )
 
 
-def codes(result: Any) -> list[str]:
+def codes(result):
     return [one.code for one in result.trunnion.findings]
 
 
-def leg(kind: str, seed: int, driver: dict[str, Any] | None = None) -> Mechanism:
+def leg(kind, seed, driver=None):
     """The arm with a leg whose inner joint stands anywhere between its balls; driven, it is a jack."""
     rng = np.random.default_rng(seed)
     data = arm().data()
@@ -54,13 +50,13 @@ def leg(kind: str, seed: int, driver: dict[str, Any] | None = None) -> Mechanism
     return Mechanism(**data)
 
 
-JACKS: dict[str, dict[str, Any]] = {
+JACKS = {
     "revolute": {"speed": 0.3, "range": [1.8, 2.0]}, "prismatic": {"speed": 0.1, "range": [0.3, 0.4]},
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", JACKS)
-def test_an_idle_leg_changes_nothing(kind: str) -> None:
+def test_an_idle_leg_changes_nothing(kind):
     bare = brief(arm(), 9)
     result = analyse(leg(kind, 1), 9)
     assert codes(result).count("mobility.spin") == 1
@@ -69,7 +65,7 @@ def test_an_idle_leg_changes_nothing(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", JACKS)
-def test_a_driven_leg_is_a_force_between_its_balls(kind: str) -> None:
+def test_a_driven_leg_is_a_force_between_its_balls(kind):
     """Whatever its shape: F along the line holds the arm, by virtual work effort · q̇ = F · l̇."""
     for seed in range(2):
         result = brief(leg(kind, seed, JACKS[kind]), 9)
@@ -85,7 +81,7 @@ def test_a_driven_leg_is_a_force_between_its_balls(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", JACKS)
-def test_a_leg_of_any_shape_does_not_spin(kind: str) -> None:
+def test_a_leg_of_any_shape_does_not_spin(kind):
     """Its first link has no part of ω along the line; velocities and accelerations are those of its poses."""
     result = brief(leg(kind, 1, JACKS[kind]), 401)
     step = float(np.diff(result["time"].values[:2])[0])
@@ -101,14 +97,14 @@ def test_a_leg_of_any_shape_does_not_spin(kind: str) -> None:
     np.testing.assert_allclose((place[:, 2:] - place[:, :-2]) / (2 * step), speed[:, 1:-1], atol=1e-5)
 
 
-def test_a_mass_beside_the_line_of_a_leg_is_refused() -> None:
+def test_a_mass_beside_the_line_of_a_leg_is_refused():
     data = leg("revolute", 0).data()
     data["links"]["rod"] |= {"mass": 1.0, "centre": [0.3, 0, 0]}
     with pytest.raises(MechanismError, match=r"the links tube, rod together may spin about U-L.*U a universal joint"):
         analyse(Mechanism(**data), 5)
 
 
-PLACES: dict[str, Any] = {  # m, as drawn
+PLACES = {  # m, as drawn
     "A": [0.0, 0.35, 0.20], "B": [0.0, 0.42, 0.45], "E": [0.0, 0.78, 0.18], "F": [-0.02, 0.72, 0.47],
     "M": [0.12, 0.38, 0.24], "N": [0.13, 0.75, 0.23], "U": [0.02, 0.48, 0.62], "L": [0.01, 0.62, 0.20],
     "W": [0.0, 0.85, 0.0],
@@ -117,7 +113,7 @@ AXES = {"A": [1.0, 0.02, 0.01], "B": [1.0, -0.03, 0.04]}
 FORCE = [400.0, 900.0, 4200.0]
 
 
-def wishbone() -> Mechanism:
+def wishbone():
     """Two arms, an upright with a tie rod, and a strut from the chassis to the lower arm, driven along its slide."""
     up, low = np.array(PLACES["U"]), np.array(PLACES["L"])
     length = float(np.linalg.norm(low - up))
@@ -125,7 +121,7 @@ def wishbone() -> Mechanism:
         "ground": ["A", "B", "M", "U"], "lower": ["A", "E", "L"], "upper": ["B", "F"], "upright": ["E", "F", "N", "W"],
         "tie": ["M", "N"],
     }  # fmt: skip
-    drawn: dict[str, Any] = {
+    drawn = {
         link: {"points": {p: {"at": PLACES[p], **({"axis": AXES[p]} if p in AXES else {})} for p in points}}
         for link, points in links.items()
     }
@@ -144,7 +140,7 @@ def wishbone() -> Mechanism:
 
 
 @pytest.mark.slow
-def test_a_double_wishbone_with_a_strut() -> None:
+def test_a_double_wishbone_with_a_strut():
     """Every link is in equilibrium; two spins, of the strut and the tie rod, need nothing."""
     result = analyse(wishbone(), 9)
     assert codes(result).count("mobility.spin") == 2
@@ -152,10 +148,10 @@ def test_a_double_wishbone_with_a_strut() -> None:
     assert np.ptp(result["drive_effort"].values) > 10.0
 
 
-def test_a_pad_on_a_plane_under_a_ball() -> None:
+def test_a_pad_on_a_plane_under_a_ball():
     """The ball of a lever in a pad that slides on the face of a crank: where it is follows from the plane alone."""
     length, face, hinge = 0.5, 0.1, {"at": [0, 0, 0], "axis": [1, 0, 0]}
-    lever: dict[str, Any] = {"V": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "Q": [length, 0, 0]}
+    lever = {"V": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "Q": [length, 0, 0]}
     mechanism = Mechanism(
         space="spatial",
         links={
@@ -172,10 +168,10 @@ def test_a_pad_on_a_plane_under_a_ball() -> None:
     result = analyse(mechanism, 10)
     assert codes(result).count("mobility.spin") == 1
 
-    def ball(angle: float) -> Array:
+    def ball(angle):
         return np.array([-0.4 + length * np.cos(angle), 0.15, 0.3 - length * np.sin(angle)])
 
-    def lifted(theta: float) -> float:
+    def lifted(theta):
         normal = np.array([0.0, -np.sin(theta), np.cos(theta)])
         return float(brentq(lambda angle: normal @ ball(angle) - face - 0.02, -0.6, 1.2, xtol=1e-15))
 

@@ -9,7 +9,7 @@ from playing import rattling
 from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
 
 
-def test_a_long_pin_is_a_pin_in_the_plane() -> None:
+def test_a_long_pin_is_a_pin_in_the_plane():
     """Both ends touch as the planar pin does, each with half its stiffness, force and impulse."""
     space, plane = (trunnion.simulate(one, 3e-4, 100) for one in (rattling_in_space(), rattling()))
     assert list(space["contact"].values) == ["Q.end_1", "Q.end_2", "Q.shoulder_1", "Q.shoulder_2"]
@@ -25,7 +25,7 @@ def test_a_long_pin_is_a_pin_in_the_plane() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("duration", [7e-3, pytest.param(0.02, marks=pytest.mark.slow)])
-def test_a_shaft_that_is_let_go_in_its_hole(duration: float) -> None:
+def test_a_shaft_that_is_let_go_in_its_hole(duration):
     """It tilts, so that one end touches first, slips with friction and comes against a shoulder: by own equations of
     Newton and Euler. Its momentum changes by weight and contact forces alone."""
     result = trunnion.simulate(dropped(), duration, 50)
@@ -52,7 +52,7 @@ def test_a_shaft_that_is_let_go_in_its_hole(duration: float) -> None:
 
 
 @pytest.mark.slow
-def test_less_clearance_gives_force_and_moment_without_play() -> None:
+def test_less_clearance_gives_force_and_moment_without_play():
     """The moment is the couple of the forces at the two ends. What both differ by falls with the clearance."""
     positions = np.array([50, 60])  # degrees from the start, long after it
     ideal = brief(tilting({}), 360)
@@ -71,7 +71,7 @@ def test_less_clearance_gives_force_and_moment_without_play() -> None:
 
 
 @pytest.mark.slow
-def test_a_cross_beside_a_bearing_with_play() -> None:
+def test_a_cross_beside_a_bearing_with_play():
     """tan θ₂ = tan θ₁/cos β of a Cardan joint (β = 30°, θ from where the driving fork lies across both shafts), but for
     how far the play lets the shaft lean."""
     result = trunnion.simulate(cardan(), 0.02, 100)
@@ -84,7 +84,7 @@ def test_a_cross_beside_a_bearing_with_play() -> None:
 
 
 @pytest.mark.slow
-def test_a_coupler_that_slides_on_a_plate() -> None:
+def test_a_coupler_that_slides_on_a_plate():
     """It stays on the plate, which carries what tilts it; the account of the energy holds."""
     result = trunnion.simulate(on_a_plate(), 0.01, 50)
     assert np.allclose(result["point_position"].sel(point="coupler.C", axis="z"), 0.0, atol=1e-15)

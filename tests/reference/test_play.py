@@ -4,8 +4,6 @@ Brute force moves the pins in their holes and closes the mechanism exactly: `pla
 """
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +12,7 @@ from presses import press
 import mechanisms
 import mechanisms_space
 import trunnion
-from mechanisms import Array
-from mechanisms_parts import plunger
+from mechanisms_parts import example, plunger
 from played import (
     by_duals,
     by_virtual_load,
@@ -34,14 +31,13 @@ from trunnion.measures.measures import named, outputs
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NOW = np.zeros(1)
 
 
 @pytest.mark.parametrize("joint", "ABCD")
-def test_four_bar(joint: str) -> None:
+def test_four_bar(joint):
     """0.02 mm in any one joint turns the rocker by up to 0.017902° at 60°: the links carry one force, 1/(c sin μ)."""
     mechanism = four_bar(joint)
     at = trunnion.play(mechanism, steps=6).isel(position=0)
@@ -58,7 +54,7 @@ def test_four_bar(joint: str) -> None:
 
 
 @pytest.mark.parametrize("at", [np.pi / 3, "420 deg"])
-def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
+def test_one_position_is_that_of_the_cycle(at):
     mechanism = four_bar("B")
     names = ["rotation:D", "effort:A"]
     one, cycle = trunnion.play(mechanism, names, at=at), trunnion.play(mechanism, names, steps=12)
@@ -71,13 +67,13 @@ def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("hole_on", ["rocker", "ground"])
-def test_rssr(hole_on: str) -> None:
+def test_rssr(hole_on):
     """0.044402° by the formula."""
     result = trunnion.play(rssr(hole_on=hole_on), ["rotation:D"], steps=1)
     assert np.degrees(float(result["worst_case"].item())) == pytest.approx(0.044402, abs=5e-7)
 
 
-def test_ends_and_dimensions_of_a_play_scatter_by_one_rule() -> None:
+def test_ends_and_dimensions_of_a_play_scatter_by_one_rule():
     """Uniform in an interval, a disc, a ball: ρ²/3, ρ²/4, ρ²/5 for a unit load in every joint."""
     seen = set()
     for data in (mechanisms.MODELS["slider-crank"](), mechanisms_space.MODELS["RSSR"]().data):
@@ -90,7 +86,7 @@ def test_ends_and_dimensions_of_a_play_scatter_by_one_rule() -> None:
     assert seen == {1, 2, 3}
 
 
-def _agree(run: Run, names: list[str], time: np.ndarray) -> None:
+def _agree(run, names, time):
     """The unit load says what the derivatives through the closure say, at all ends of all joints."""
     known = plays(run.system, run.values)
     walk = forward(run.system, run.values, run.chosen.assembly, time)
@@ -109,7 +105,7 @@ def _agree(run: Run, names: list[str], time: np.ndarray) -> None:
 
 @pytest.mark.spread(7)
 @pytest.mark.parametrize("name", mechanisms.MODELS)
-def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
+def test_virtual_load_equals_derivatives_in_the_plane(name):
     """Dyads, general groups, gear pairs, drivers: the same to rounding for every measure."""
     run = prepare(with_play(mechanisms.model(mechanisms.MODELS[name]())))
     _agree(run, measures_of(run), run.cycle.times(5) + 1e-3)
@@ -117,13 +113,13 @@ def test_virtual_load_equals_derivatives_in_the_plane(name: str) -> None:
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("name", [name for name in mechanisms_space.MODELS if name != "platform on six legs"])
-def test_virtual_load_equals_derivatives_in_space(name: str) -> None:
+def test_virtual_load_equals_derivatives_in_space(name):
     """All pairs; every seventh measure, to save time."""
     run = prepare(with_play(mechanisms_space.MODELS[name]().data, float_=1e-5))
     _agree(run, measures_of(run)[::7], run.cycle.times(3) + 1e-4)
 
 
-def test_misaligned_holes_and_offset_bearings() -> None:
+def test_misaligned_holes_and_offset_bearings():
     """The ends lie about the middle of the bearing, in the frame of the hole as it leans."""
     data = rssr().data()
     data["joints"]["D"] |= {"misalignment": {"tilt": "2 deg", "towards": "30 deg", "offset": "0.3 mm"}}
@@ -146,7 +142,7 @@ BRUTE = {
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("name", BRUTE)
-def test_worst_case_is_reached_and_not_passed_but_by_second_order(name: str) -> None:
+def test_worst_case_is_reached_and_not_passed_but_by_second_order(name):
     """Pins pressed by Qᵢ change y by Σ ρ|Qᵢ|, anywhere else by less; what is missing falls with the square of ρ."""
     make, names = BRUTE[name]
     missed = []
@@ -179,7 +175,7 @@ def test_worst_case_is_reached_and_not_passed_but_by_second_order(name: str) -> 
     assert missed[1] < 0.3 * missed[0]
 
 
-def test_effort_with_friction_against_brute_force() -> None:
+def test_effort_with_friction_against_brute_force():
     """Drive torque of a slider-crank with friction and mass: derivatives through the settled friction."""
     run = prepare(with_play(mechanisms.model(mechanisms.slider_crank(), friction=0.1), 1e-5))
     known, time = plays(run.system, run.values), run.cycle.times(8)[1:2] + 0.01
@@ -193,7 +189,7 @@ def test_effort_with_friction_against_brute_force() -> None:
         assert float(back.efforts["A"].item()) - base == pytest.approx(most, rel=2e-3)
 
 
-def test_end_float() -> None:
+def test_end_float():
     """A rocker that can shift along its axis by half the float either way, against brute force."""
     mechanism = rssr(clearance=1e-9, float_=1e-4)
     run = prepare(mechanism)
@@ -207,8 +203,8 @@ def test_end_float() -> None:
 
 
 @pytest.mark.slow
-def test_totals_and_attributes() -> None:
-    mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
+def test_totals_and_attributes():
+    mechanism = example("toleranced-slider-crank")
     result = trunnion.play(mechanism, steps=36)
     assert list(result["measure"].values) == ["stroke-position", "drive-torque"]
     assert result["measure_unit"].values.tolist() == ["m", "N m"]
@@ -223,14 +219,14 @@ def test_totals_and_attributes() -> None:
     assert "stroke-position.worst_case" in [figure.name for figure in summary_of(result)]
 
 
-def test_driven_joints_have_play_too() -> None:
+def test_driven_joints_have_play_too():
     """The pin of the driver moves the crank's point B as it moves itself."""
     result = trunnion.play(four_bar("A"), ["crank.B.x"], steps=8)
     np.testing.assert_allclose(result["worst_case"].values, 2e-5, rtol=1e-9)
 
 
 @pytest.mark.parametrize("place", [{}, {"at": "30 deg"}, {"as": "maximum"}])
-def test_limit(place: dict[str, str]) -> None:
+def test_limit(place):
     """The worst case there decides, on either side of it."""
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", **place}}}
     worst = np.rad2deg(trunnion.play(trunnion.Mechanism(**data), steps=72)["extreme_worst_case"].values.sum())
@@ -241,8 +237,8 @@ def test_limit(place: dict[str, str]) -> None:
 
 
 @pytest.mark.slow
-def test_redundant_constraints_make_it_a_bound() -> None:
-    mechanism = trunnion.read(EXAMPLES / "fourbar-in-space.yaml")
+def test_redundant_constraints_make_it_a_bound():
+    mechanism = example("fourbar-in-space")
     if mechanism.over_constraint == "refuse":
         mechanism = trunnion.Mechanism(**{**mechanism.data(), "over_constraint": "minimum-norm"})
     result = trunnion.play(with_play(mechanism.data()), steps=12)
@@ -253,7 +249,7 @@ STEPS, TRIALS = 24, 4000
 LARGE = 9.5e-3  # m: play at which the second order shows
 
 
-def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
+def test_exact_figure_bounds_pins_at_the_rims_of_their_holes():
     """No random place of all pins at the rims moves the link further, and the best of them comes close."""
     mechanism = with_play(mechanisms.four_bar(), LARGE)
     link = [name for name in mechanism.effective_links if name != mechanism.fixed_link][-1]
@@ -268,7 +264,7 @@ def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
     reached = 0.0
     for _ in range(STEPS):
         time = np.full(TRIALS, float(result["extreme_time"].item()))
-        places: dict[str, Array] = {}
+        places = {}
         for joint in mechanism.effective_joints:
             angle = rng.uniform(0, 2 * np.pi, TRIALS)
             rim = (LARGE * np.cos(angle), LARGE * np.sin(angle))
@@ -278,7 +274,7 @@ def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
     assert reached > 0.9 * exact
 
 
-def pressed(depth: float, play: float) -> Mechanism:
+def pressed(depth, play):
     """A slider-crank, in line where it presses on a spring most deeply, with play between rod and slider alone."""
     spring = {"between": ["ground.W", "ram.B"], "stiffness": 1e6, "free_length": 0.08 + depth, "only": "push"}
     return Mechanism(
@@ -290,7 +286,7 @@ def pressed(depth: float, play: float) -> Mechanism:
 
 
 @pytest.mark.parametrize("play", [2e-5, 5e-4])
-def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
+def test_pins_move_the_corner_of_a_largest_effort(play):
     """A press whose force begins at x = 115 mm, passed both ways: M = F r sin(θ + φ)/cos φ there, of the crank
     that play leaves, by the pins at both its ends, and of the place of the rod's end, by that of the ram. Before and
     behind the dead centre the effort is as large, so that a ram off the line to either side raises it."""
@@ -324,7 +320,7 @@ def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
 PRESSED = (0.03, 0.115, 0.0)  # m: crank, and where the force begins
 
 
-def moment(crank: float, x: Any, y: Any) -> Any:
+def moment(crank, x, y):
     """Drive moment, N m, of a slider-crank whose slider is pressed on, with the end of its rod at (x, y)."""
     rod, force = 0.1, 1000.0
     away = np.hypot(x, y)

@@ -1,11 +1,10 @@
 """Machine code solves a row of modules as NumPy does, also where it locks, turns round or cannot be assembled."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from benchmarks.studio import chain
 
+from mechanisms_parts import EXAMPLES
 from trunnion.algebra.dual import Dual
 from trunnion.engines import parts
 from trunnion.model.file import entries_of
@@ -17,7 +16,6 @@ from trunnion.solve.margin import margin_in
 from trunnion.solve.row_code import leaves_of
 from trunnion.solve.run import prepare
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 90
 TEXTS = {
     "chain": chain(13),

@@ -2,11 +2,9 @@
 
 import copy
 import json
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from benchmarks.drawn import planar
 
 import trunnion
@@ -14,18 +12,18 @@ from brief import brief
 from mechanisms import four_bar, model, slider_crank
 from mechanisms_parts import body, joined
 from mechanisms_space import cardan, closed, rssr
-from reference.maximal_space import Array, Data, Drive, in_planes, pose_of
+from reference.maximal_space import Drive, in_planes, pose_of
 from reference.seat_oracle import clearance, settle, travelling
 from trunnion.algebra.panels import ON_GRID
 from trunnion.errors import Status
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.solve.seating import SETTLED, loads_of, seating_of
 
 LINKAGES = {"four-bar": four_bar, "slider-crank": slider_crank}
 START = 0.1  # rad: off the positions at which the ideal joints do not slip
 
 
-def loaded(name: str, friction: float = 0.0, rho: float = 2e-4, guide: float | None = None) -> Data:
+def loaded(name, friction=0.0, rho=2e-4, guide=None):
     """A linkage of about 1 m with play in all its joints."""
     data = copy.deepcopy(model(LINKAGES[name](), friction=friction or None))
     data["joint_defaults"]["pin"]["clearance"] = rho
@@ -36,11 +34,11 @@ def loaded(name: str, friction: float = 0.0, rho: float = 2e-4, guide: float | N
     return data
 
 
-def analysed(data: Data, steps: int) -> xr.Dataset:
+def analysed(data, steps):
     return brief(trunnion.Mechanism(trunnion=1, **data), steps)
 
 
-def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
+def offsets_of(run, result):
     """The seats of a result as values."""
     found = {}
     for seat in run.seats:
@@ -54,9 +52,7 @@ def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
     return found
 
 
-def settled_alike(
-    data: Data, steps: int, places: Any, limit: float = 2e-6, forces: float = 1e-7, moving: float = np.inf
-) -> int:
+def settled_alike(data, steps, places, limit=2e-6, forces=1e-7, moving=np.inf):
     """Seats to a share of the clearance, links to 1e-9, forces and drive to a share, at some positions. Rounds.
 
     Forces at the seats as found, with pins held in them: with friction, that a seat travels turns the slip round a
@@ -104,16 +100,16 @@ def settled_alike(
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.12, 0.3])
 @pytest.mark.parametrize("name", LINKAGES)
-def test_planar_linkage_with_play_in_all_joints(name: str, friction: float) -> None:
+def test_planar_linkage_with_play_in_all_joints(name, friction):
     settled_alike(loaded(name, friction), 36, range(0, 36, 5), forces=1e-8)
 
 
-def losses(result: xr.Dataset, joint: str) -> Array:
+def losses(result, joint):
     """Positions at which a joint is said to lose contact."""
     return np.flatnonzero(result.contact_lost.sel(joint=joint).values)
 
 
-def one_crank() -> Data:
+def one_crank():
     """A crank alone with ω² r = g: its bearing carries m g (−cos θ, 1 − sin θ), nothing at 90°, and turns round."""
     r, g = 0.1, 9.81
     link = {**body({"A": [0, 0], "B": [r, 0]}), "centre": [r, 0.0]}
@@ -127,7 +123,7 @@ def one_crank() -> Data:
 
 
 @pytest.mark.parametrize("steps", [72, 101])
-def test_crank_whose_bearing_is_relieved_at_one_angle(steps: int) -> None:
+def test_crank_whose_bearing_is_relieved_at_one_angle(steps):
     """Loss of contact at 90°, in closed form, whether a position is there or not, and nowhere else."""
     result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **one_crank()), steps)
     angle = np.degrees(result.joint_rotation.sel(joint="A").values)
@@ -148,7 +144,7 @@ def test_crank_whose_bearing_is_relieved_at_one_angle(steps: int) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.12])
 @pytest.mark.parametrize("name", LINKAGES)
-def test_power_of_the_settled_linkage(name: str, friction: float) -> None:
+def test_power_of_the_settled_linkage(name, friction):
     """Drive, loads and inertia against what the joints lose, to rounding; a joint without friction loses O(ρ²).
 
     The way of a seat is along the wall, its load is across but for the inertia of that way, which is another ρ.
@@ -167,7 +163,7 @@ def test_power_of_the_settled_linkage(name: str, friction: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LINKAGES)
-def test_reactions_of_a_result_are_those_of_the_whole_motion(name: str) -> None:
+def test_reactions_of_a_result_are_those_of_the_whole_motion(name):
     """Inertia by the accelerations of the settled places: as the oracle's, to what its differences leave."""
     for rho in (1e-4, 2.5e-5):
         data = loaded(name, rho=rho)
@@ -186,7 +182,7 @@ def test_reactions_of_a_result_are_those_of_the_whole_motion(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LINKAGES)
-def test_rates_are_the_derivatives_of_the_offsets(name: str) -> None:
+def test_rates_are_the_derivatives_of_the_offsets(name):
     """Velocities and accelerations of every point, beside the inertia of the ideal motion: against its own places."""
     run = prepare(trunnion.Mechanism(trunnion=1, **loaded(name, 0.12)))
     seating, step = seating_of(run), 1e-4 * run.cycle.duration
@@ -201,7 +197,7 @@ def test_rates_are_the_derivatives_of_the_offsets(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_pins_lie_at_their_walls_between_many_bends() -> None:
+def test_pins_lie_at_their_walls_between_many_bends():
     """Seats of four pins that bend in more places than most: none is the polynomial of a panel that is too wide."""
     seating = seating_of(prepare(trunnion.Mechanism(**planar.seated(90022)[1])))
     panels = seating.courses.states == SETTLED
@@ -212,7 +208,7 @@ def test_pins_lie_at_their_walls_between_many_bends() -> None:
         assert np.allclose(np.linalg.norm(between[:, end.rows], axis=1), end.radius, rtol=1e-9, atol=0.0)
 
 
-def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> None:
+def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions():
     """At 90° of the crank in closed form; a pin that its load cannot hold on its way lifts off in the same stretch."""
     crank = prepare(trunnion.Mechanism(trunnion=1, **one_crank()))
     (crossing,) = seating_of(crank).loads.crossings
@@ -227,7 +223,7 @@ def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.1, 0.4])
-def test_rssr_with_play_in_all_joints(friction: float) -> None:
+def test_rssr_with_play_in_all_joints(friction):
     """Tilted pins and balls under inertia, weight and a brake."""
     data = copy.deepcopy(rssr(start=START, friction=friction).data)
     data["assembly"] = {"D": 1.3}
@@ -236,7 +232,7 @@ def test_rssr_with_play_in_all_joints(friction: float) -> None:
 
 
 @pytest.mark.slow
-def test_cardan_with_play_in_all_joints() -> None:
+def test_cardan_with_play_in_all_joints():
     """Table II of Pezzuti et al. with 0.01 mm all over, friction 0.42, pins that slide along."""
     start = 0.3
     drawn = closed(cardan(), start)

@@ -1,32 +1,27 @@
 """Friction in space against closed forms and the plane: Cardan joint, screw, hinges of a door, coupled wheels."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
 from brief import brief
 from mechanisms import MODELS, build, model
 from mechanisms_parts import joined
 from mechanisms_space import cardan, rssr
-from reference.maximal_space import Data, raised
+from reference.maximal_space import raised
 from reference.test_space_values import loop
 from trunnion.solve.run import prepare
 from trunnion.solve.space.determinacy import LOOKED
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LOCKED = int(trunnion.Status.LOCKED)
 PIN, ARM = 0.010, 0.040  # radius of the cross pins, and where on the cross the forks hold it
 
 
-def analysed(data: Data, steps: int, **options: Any) -> xr.Dataset:
+def analysed(data, steps, **options):
     return trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), steps=steps, **options)
 
 
-def hooke(delta: float, friction: float, shafts: float = 0.0) -> Data:
+def hooke(delta, friction, shafts=0.0):
     """Massless ideal Cardan joint; the ends of a bearing as long as the cross is wide are where the forks hold it."""
     brake = {"brake": {"joint": "D", "resisting_torque": 10.0, "useful": True}}
     data = loop("RCCC", (90, 90, 90, 180 - delta), start=0.003, assembly={"D": -np.pi / 2}, loads=brake)
@@ -39,7 +34,7 @@ def hooke(delta: float, friction: float, shafts: float = 0.0) -> Data:
 
 
 @pytest.mark.parametrize(("delta", "shafts"), [(15.0, 0.02), (45.0, 0.0)])
-def test_massless_cardan(delta: float, shafts: float) -> None:
+def test_massless_cardan(delta, shafts):
     """1 − η to the first order in f; what is left shrinks as f².
 
     Pins (2/π) f (r_p/R_c) [tan δ + ln tan(π/4 + δ/2)]; shafts (4/π) f r_b [tan δ/l₂ + ln tan(π/4 + δ/2)/l₁], l₁ of the
@@ -65,7 +60,7 @@ def test_massless_cardan(delta: float, shafts: float) -> None:
     ],
     ids=["at 45 degrees", "RSSR with inertia"],
 )
-def test_nothing_is_lost_without_friction(data: Data) -> None:
+def test_nothing_is_lost_without_friction(data):
     """η = 1 within 1e-12, and the power balances to 1e-10 of its peak at every position."""
     data = {**data, "drivers": {name: {**one, "start": 0.003} for name, one in data["drivers"].items()}}
     result = analysed(data, 720)
@@ -82,7 +77,7 @@ LEAD = np.arctan(PITCH / (2 * np.pi * MEAN))
 
 @pytest.mark.parametrize("friction", [0.08, 0.2])
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_screw_jack(friction: float, way: float) -> None:
+def test_screw_jack(friction, way):
     """Torque F r tan(λ ± φ) to raise and to lower; a thread with φ > λ has to be driven down."""
     axis = {"at": [0, 0, 0], "axis": [0, 0, 1]}
     thread = {"pitch": PITCH, "friction": friction, "pin": {"radius": MEAN, "bearing": 0.1}}
@@ -112,12 +107,12 @@ def test_screw_jack(friction: float, way: float) -> None:
 
 
 @pytest.mark.parametrize("turned", [(), ("B",)])
-def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
+def test_friction_that_drags_a_rod_round(turned):
     """Each ball drags the rod by f r |F| along the other link's turn against it; what is along the rod adds up.
 
     Whichever link of a ball is named first: here by the turns of the links themselves, over the same positions.
     """
-    data = trunnion.Mechanism.read(EXAMPLES / "rssr.yaml").data()
+    data = trunnion.Mechanism.example("rssr").data()
     for joint in turned:
         data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
     run = prepare(trunnion.Mechanism(**data))
@@ -125,7 +120,7 @@ def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
     back = run.solve(run.cycle.times(LOOKED))
     motions, radius, friction = back.walk.motions, 0.007, 0.1
 
-    def vector(numbers: Any) -> Any:
+    def vector(numbers):
         return np.array([np.broadcast_to(one, LOOKED) for one in numbers], float)
 
     ends = {joint: vector(back.walk.element("rod", joint).place) for joint in ("B", "C")}
@@ -143,7 +138,7 @@ DOOR, ARM_OF_WEIGHT = 20.0, 0.4
 STILL = {"drivers": {"lower": {"speed": 1e-6, "range": [0.0, 1.5]}}}
 
 
-def door(hinges: dict[str, float], bearing: float, friction: float = 0.1, **more: Any) -> trunnion.Mechanism:
+def door(hinges, bearing, friction=0.1, **more):
     """A door of 20 kg on hinges at these heights, whose pins of 6 mm turn in bearings of the given length."""
     points = {name: {"at": [0, 0, height], "axis": [0, 0, 1]} for name, height in hinges.items()}
     leaf = {"mass": DOOR, "centre": [ARM_OF_WEIGHT, 0, 0.5], "inertia": {"xx": 2.4, "yy": 3.5, "zz": 1.1}}
@@ -162,7 +157,7 @@ def door(hinges: dict[str, float], bearing: float, friction: float = 0.1, **more
 
 
 @pytest.mark.parametrize(("apart", "bearing"), [(0.5, 0.2), (0.5, 0.02)])
-def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(apart: float, bearing: float) -> None:
+def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(apart, bearing):
     """A hinge gives way across by F/k and tilts by M/(k h²), h half its bearing: F a = C/(1 + 4 h²/a²)."""
     model = door({"lower": 0.0, "upper": apart}, bearing, **STILL)
     force = DOOR * 9.81 * ARM_OF_WEIGHT / apart / (1 + (bearing / apart) ** 2)
@@ -174,7 +169,7 @@ def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(apart: float, be
 
 
 @pytest.mark.slow
-def test_hinges_of_stated_stiffness_are_a_rigid_beam_on_springs() -> None:
+def test_hinges_of_stated_stiffness_are_a_rigid_beam_on_springs():
     """Three hinges: deflections δ and rotation φ from the balance of forces and moments, F = k (δ + z φ), M = κ φ."""
     heights, radial = np.array([0.1, 0.7, 1.6]), np.array([3e6, 1e6, 8e6])
     tilting = np.array([2e3, 9e5, 4e4])
@@ -197,7 +192,7 @@ def test_hinges_of_stated_stiffness_are_a_rigid_beam_on_springs() -> None:
         trunnion.analyse(trunnion.Mechanism(**model), 4)
 
 
-def test_one_bearing_with_two_ends_has_the_friction_of_a_door() -> None:
+def test_one_bearing_with_two_ends_has_the_friction_of_a_door():
     """The weight turns the leaf over: each end carries W a/L whatever the bearing is made of."""
     result = brief(door({"lower": 0.5}, bearing=1.0), 4)
     torque = 0.1 * 0.006 * 2 * DOOR * 9.81 * ARM_OF_WEIGHT / 1.0
@@ -217,7 +212,7 @@ STEPS = 16
 @pytest.mark.slow
 @pytest.mark.parametrize("friction", [None, 0.12])
 @pytest.mark.parametrize("name", NAMES)
-def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
+def test_planar_mechanism_in_space(name, friction):
     """Motion to 1e-10, forces to 1e-8 of the largest; nothing across the plane, where friction is refused for that."""
     data = raised(model(MODELS[name](), friction=friction)) | {"over_constraint": "minimum-norm"}
     data["joint_defaults"] |= {"pin": {**data["joint_defaults"]["pin"], "bearing": 0.05}}
@@ -244,11 +239,11 @@ def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
         assert np.nanmax(np.abs(flat.friction_power.values)) > 1e-3
 
 
-def coupled_wheels(stiffness: dict[str, float]) -> Data:
+def coupled_wheels(stiffness):
     """Three equal cranks on one coupling rod: mobility 0 by the count, 1 by rank."""
     feet = {"A": (0.0, 0.0), "B": (1.2, 0.0), "C": (1.7, 0.9)}
     pins = dict(zip(feet, "DEF", strict=True))
-    links: Data = {"ground": {"points": {name: list(place) for name, place in feet.items()}}}
+    links = {"ground": {"points": {name: list(place) for name, place in feet.items()}}}
     for name, pin in pins.items():
         links[f"wheel-{name}"] = {"points": {name: [0, 0], pin: [0.3, 0]}, "mass": 20.0, "inertia": 0.5}
     rod = {pin: list(feet[name]) for name, pin in pins.items()}
@@ -264,7 +259,7 @@ def coupled_wheels(stiffness: dict[str, float]) -> Data:
     }  # fmt: skip
 
 
-def test_three_wheels_share_their_load_by_stiffness() -> None:
+def test_three_wheels_share_their_load_by_stiffness():
     """Without friction: forces of the one self-stress shift the energy nowhere, Σ F · S / k = 0."""
     stiffness = dict(zip("ABCDEF", (2e7, 5e6, 8e6, 3e7, 1e6, 4e6), strict=True))
     result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **coupled_wheels(stiffness)), STEPS)

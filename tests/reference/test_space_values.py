@@ -1,17 +1,14 @@
 """Motion in space against closed forms and published numbers, and the chain of three cylindrical joints by itself."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
 from brief import brief
-from reference.maximal_space import Array, Data, Frame, rotation, unrolled
+from reference.maximal_space import Frame, rotation, unrolled
 from spatial_numbers import apart
 from toleranced import RSSR, rssr
-from trunnion.algebra.dual import Dual, functions, parts, primal, spatial
+from trunnion.algebra.dual import functions, parts, primal, spatial
 from trunnion.algebra.lines import line, link
 from trunnion.algebra.vector import product, transpose
 from trunnion.groups import GROUPS, ccc
@@ -19,16 +16,14 @@ from trunnion.groups import GROUPS, ccc
 SPEED = 2.0
 
 
-def analysed(data: Data, steps: int) -> xr.Dataset:
+def analysed(data, steps):
     return brief(trunnion.Mechanism(trunnion=1, **data), steps)
 
 
-def loop(
-    kinds: str, twists: Any, distances: Any = (0.0, 0.0, 0.0, 0.0), slide: float = 0.0, start: float = 0.0, **more: Any
-) -> Data:
+def loop(kinds, twists, distances=(0.0, 0.0, 0.0, 0.0), slide=0.0, start=0.0, **more):
     """A closed chain of four; twists in degrees."""
     names = {"R": "revolute", "C": "cylindrical"}
-    rows: list[Data] = [
+    rows = [
         {"joint": joint, "type": names[kind], "link": link, "twist": float(np.radians(twist)), "distance": distance}
         for joint, link, kind, twist, distance in zip(
             "ABCD", ("crank", "coupler", "rocker", "ground"), kinds, twists, distances, strict=True
@@ -39,16 +34,16 @@ def loop(
     return {"space": "spatial", "loop": rows, "drivers": {"A": {"speed": SPEED, "start": start}}, **more}
 
 
-def value(result: xr.Dataset, name: str, joint: str) -> Array:
+def value(result, name, joint):
     return np.asarray(result[name].sel(joint=joint).values, float)
 
 
-def turned(result: xr.Dataset, joint: str) -> Array:
+def turned(result, joint):
     """Rotation of a joint on the unit circle."""
     return np.asarray(np.exp(1j * value(result, "joint_rotation", joint)))
 
 
-def missed(result: xr.Dataset, rows: list[Data]) -> float:
+def missed(result, rows):
     """By how much Π Z(θ + ε s) X(α + ε a) of the result's joint motion misses the identity; rad or m."""
     worst = 0.0
     for i in range(result.sizes["position"]):
@@ -62,7 +57,7 @@ def missed(result: xr.Dataset, rows: list[Data]) -> float:
 
 
 @pytest.mark.parametrize("general", [False, True])
-def test_rccc(general: bool) -> None:
+def test_rccc(general):
     """Computed from the closure by another program; loop and links with points say the same."""
     data = loop("RCCC", (25, 70, 55, 60), (1.0, 3.0, 2.5, 2.8), slide=0.6, assembly={"D": 1.42})
     result = analysed(unrolled(data) if general else data, 6)
@@ -78,7 +73,7 @@ def test_rccc(general: bool) -> None:
     assert missed(result, data["loop"]) < 1e-12
 
 
-def rocker_angle(theta: Array, branch: int, **other: float) -> tuple[Array, Array]:
+def rocker_angle(theta, branch, **other):
     """ψ of E cos ψ + F sin ψ = G, which is |B − A|² = b² written out, and dψ/dθ of the same equation."""
     a, b, c, d, alpha, s1, s4 = {**RSSR, **other}.values()
     k, x = np.array([0, -np.sin(alpha), np.cos(alpha)])[:, None], np.array([1.0, 0, 0])[:, None]
@@ -95,7 +90,7 @@ def rocker_angle(theta: Array, branch: int, **other: float) -> tuple[Array, Arra
 
 
 @pytest.mark.parametrize(("branch", "degrees"), [(1, 73.843222), (-1, -102.423482)])
-def test_rssr(branch: int, degrees: float) -> None:
+def test_rssr(branch, degrees):
     """ψ on both branches, at 60° as published for this project and over the whole turn by its quadratic equation."""
     start = rocker_angle(np.array([0.0]), branch)[0][0]
     model = rssr(tolerances={}, measures={}, drivers={"A": {"speed": SPEED}}, assembly={"D": float(start)})
@@ -110,7 +105,7 @@ def test_rssr(branch: int, degrees: float) -> None:
 
 @pytest.mark.parametrize("general", [False, True])
 @pytest.mark.parametrize("delta", [15.0, 70.0])
-def test_ideal_cardan(delta: float, general: bool) -> None:
+def test_ideal_cardan(delta, general):
     """tan θ₁ tan θ₄ = −cos δ with the last twist 180° − δ; ω₂/ω₁ = cos δ/(1 − sin²δ sin²γ₁), γ₁ = θ₁ − 90°."""
     data = loop("RCCC", (90, 90, 90, 180 - delta), start=0.01, assembly={"D": -np.pi / 2})
     result = analysed(unrolled(data) if general else data, 72)
@@ -129,7 +124,7 @@ def test_ideal_cardan(delta: float, general: bool) -> None:
 
 
 @pytest.mark.slow
-def test_no_bennett() -> None:
+def test_no_bennett():
     """Without sin α : a = sin β : b four pins in space do not move: there is no number, and it is said why."""
     data = loop("RRRR", (40, 100, 40, 100), (0.2, 0.2, 0.2, 0.2), start=0.1, over_constraint="minimum-norm")
     result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), 12)
@@ -142,18 +137,18 @@ TWISTS, DISTANCES = np.radians([25, 70, 55, 60]), [1.0, 3.0, 2.5, 2.8]  # links 
 RCCC = [spatial(alpha, a) for alpha, a in zip(TWISTS, DISTANCES, strict=True)]
 
 
-def turns(rng: np.random.Generator, count: int) -> list[Dual]:
+def turns(rng, count):
     """Random joint angles θ + ε s."""
     return [spatial(rng.uniform(-np.pi, np.pi, COUNT), rng.uniform(-2, 2, COUNT)) for _ in range(count)]
 
 
-def links(rng: np.random.Generator, count: int) -> list[Dual]:
+def links(rng, count):
     """Random twists α + ε a, not near 0 and π."""
     return [spatial(rng.uniform(0.3, np.pi - 0.3, COUNT), rng.uniform(-2, 2, COUNT)) for _ in range(count)]
 
 
 @pytest.mark.parametrize("branch", ccc.BRANCHES)
-def test_the_dual_matrices_of_random_chains_close(branch: int) -> None:
+def test_the_dual_matrices_of_random_chains_close(branch):
     """∏ Z(θ̂) X(α̂) = I on all random chains that can be assembled, but where the axes are within 1e-3 of a plane."""
     rng = np.random.default_rng(5)
     (first,), twists = turns(rng, 1), links(rng, 4)
@@ -166,7 +161,7 @@ def test_the_dual_matrices_of_random_chains_close(branch: int) -> None:
     assert np.max((dual / scale)[fine]) < 1e-12
 
 
-def test_a_chain_is_found_again_on_one_of_the_branches() -> None:
+def test_a_chain_is_found_again_on_one_of_the_branches():
     """Angles and slides of chains made to close: Z₁X₁Z₂X₂Z₃X₃ is random, Z₄X₄Z(δ̂) undoes it, δ̂ belongs to θ̂₁."""
     rng = np.random.default_rng(8)
     angles, twists = turns(rng, 3), links(rng, 3)
@@ -183,12 +178,12 @@ def test_a_chain_is_found_again_on_one_of_the_branches() -> None:
     np.testing.assert_array_equal((errors[0] < errors[1])[fine], (np.sin(primal(angles[2])) < 0)[fine])
 
 
-def angle_missed(found: Dual, wanted: Dual) -> Array:
+def angle_missed(found, wanted):
     """Distance of two dual angles, whole turns aside."""
     return np.abs(np.exp(1j * found.real) - np.exp(1j * wanted.real)) + np.abs(found.dual - wanted.dual)
 
 
-def test_small_angles_keep_their_digits() -> None:
+def test_small_angles_keep_their_digits():
     """A spherical triangle of a millionth of a radian is a plane one: sides 3, 4, 5."""
     small = 1e-6
     found = ccc.meet((0.0, 0.0, 1.0), (np.sin(3 * small), 0.0, np.cos(3 * small)), 4 * small, 5 * small, 1)
@@ -196,7 +191,7 @@ def test_small_angles_keep_their_digits() -> None:
     assert float(abs(found[1])) == pytest.approx(4 * small, rel=1e-10)
 
 
-def test_no_silent_number() -> None:
+def test_no_silent_number():
     """Parallel axes, triangles that do not close, dead centres of dual angles, a link without twist."""
     z = line((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     beside = line((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -1,8 +1,6 @@
 """Tolerances to first order, worst cases and RSS: known numbers, closed forms of their own, derivatives, corners."""
 
 import itertools
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,13 +23,11 @@ from toleranced import (
     slopes,
 )  # fmt: skip
 from toleranced import slider_crank as sized_slider
-from trunnion import Mechanism
 from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.linear import study
 
 FAST = ("linear", "worst-case")
-Case = tuple[Callable[..., Mechanism], Callable[..., Any], dict[str, float]]
-CASES: dict[str, Case] = {
+CASES = {
     "clutch": (clutch, clutch_angle, CLUTCH),
     "four-bar": (fourbar, fourbar_angle, FOURBAR),
     "slider-crank": (sized_slider, slider_place, SLIDER),
@@ -40,13 +36,13 @@ CASES: dict[str, Case] = {
 MM = 1e3  # of a derivative by a length, m⁻¹ in mm⁻¹
 
 
-def sensitivities(result: Any, measure: int = 0) -> dict[str, float]:
+def sensitivities(result, measure=0):
     paths = [str(path) for path in result["parameter"].values]
     return dict(zip(paths, result["sensitivity"].values[measure].tolist(), strict=True))
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Any]:
+def results():
     return {name: trunnion.tolerance(build_(), methods=FAST) for name, (build_, _, _) in CASES.items()}
 
 
@@ -59,7 +55,7 @@ def results() -> dict[str, Any]:
         ("RSSR", 1 / MM, (-0.00714601, -0.01955441, 0.01187232, 0.01702515, 0.26229468, -0.00948836, 0.00611075)),
     ],
 )
-def test_sensitivities(results: dict[str, Any], name: str, factor: float, known: tuple[float, ...]) -> None:
+def test_sensitivities(results, name, factor, known):
     """rad/mm and mm/mm, of an angle rad/rad, to the digits that are known."""
     digits = max(len(f"{number}".partition(".")[2]) for number in known)
     found = sensitivities(results[name])
@@ -67,7 +63,7 @@ def test_sensitivities(results: dict[str, Any], name: str, factor: float, known:
     np.testing.assert_allclose(scaled, known, rtol=0, atol=0.51 * 10.0**-digits)
 
 
-def test_one_way_clutch(results: dict[str, Any]) -> None:
+def test_one_way_clutch(results):
     """φ = 7.0183898°, worst case 0.5340°, RSS 0.3167°, and from 6.4622° to 7.5333° on the mechanism itself."""
     found = results["clutch"]
     degrees = {name: np.degrees(found[name].item()) for name in ("nominal", "worst_case_upper", "rss")}
@@ -80,7 +76,7 @@ def test_one_way_clutch(results: dict[str, Any]) -> None:
     assert high == pytest.approx(7.5333, abs=5e-5)
 
 
-def test_clearance_of_the_spatial_crank_rocker() -> None:
+def test_clearance_of_the_spatial_crank_rocker():
     """0.044402° by the formula, 0.044448° on the mechanism itself, the pin shifted and leaning in its hole."""
     pin = {"radius": "10 mm", "hole_radius": "10.02 mm", "length": "20 mm"}
     found = trunnion.tolerance(rssr(pin, {}), methods=FAST)
@@ -91,7 +87,7 @@ def test_clearance_of_the_spatial_crank_rocker() -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_derivatives_are_exact(results: dict[str, Any], name: str) -> None:
+def test_derivatives_are_exact(results, name):
     _, of, at = CASES[name]
     found = sensitivities(results[name])
     assert [path.removeprefix("dimensions.") for path in found] == list(at)
@@ -100,7 +96,7 @@ def test_derivatives_are_exact(results: dict[str, Any], name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_sums_of_first_order(results: dict[str, Any], name: str) -> None:
+def test_sums_of_first_order(results, name):
     """|S| t of each, their sum, the root of the sum of their squares; shares that add up to one."""
     result = results[name]
     _, of, at = CASES[name]
@@ -119,7 +115,7 @@ def test_sums_of_first_order(results: dict[str, Any], name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_worst_corner(results: dict[str, Any], name: str) -> None:
+def test_worst_corner(results, name):
     """The best of all corners by the closed form; and run again there, it gives the number that was found."""
     result = results[name]
     _, of, at = CASES[name]
@@ -134,7 +130,7 @@ def test_worst_corner(results: dict[str, Any], name: str) -> None:
         assert of(*corner) - of(*values) == pytest.approx(result[f"searched_{end}"].item(), rel=1e-11)
 
 
-def test_over_the_whole_turn() -> None:
+def test_over_the_whole_turn():
     """A measure without a place: the course of derivatives, the place of the worst case, and what is found there."""
     found = trunnion.tolerance(fourbar(measures={"angle": {"angle": "rocker"}}), methods=FAST, steps=72)
     turn = np.radians(found["drive"].values)
@@ -146,7 +142,7 @@ def test_over_the_whole_turn() -> None:
     np.testing.assert_allclose(found["curve_rss"].values[0], 5e-5 * np.linalg.norm(steep, axis=1), rtol=1e-7)
     np.testing.assert_allclose(found["curve_deviation"].values[0], 5e-5 / 3 * np.linalg.norm(steep, axis=1), rtol=1e-7)
 
-    def worst_at(place: float) -> float:
+    def worst_at(place):
         return 5e-5 * float(np.sum(np.abs(slopes(lambda **at: fourbar_angle(**at, crank=place), FOURBAR, 3e-5))))
 
     place = np.radians(found["place"].item())  # between the positions
@@ -163,13 +159,13 @@ def test_over_the_whole_turn() -> None:
 
 
 @pytest.mark.parametrize(("rule", "ends"), [("minimum", (np.max, np.min)), ("maximum", (np.min, np.max))])
-def test_worst_case_of_the_least_and_the_largest_deviation(rule: str, ends: tuple[Any, Any]) -> None:
+def test_worst_case_of_the_least_and_the_largest_deviation(rule, ends):
     """At a place the deviation is within ±Σ T |S|, whatever the steps. The least of all may fall as far as the widest
     of these reaches down, and can rise no farther than the narrowest reaches up; the largest the other way up."""
     measures = {"error": {"transmission_error": "D", "as": rule}}
     found = trunnion.tolerance(fourbar(measures=measures), methods=["linear", "worst-case"], steps=7)
 
-    def worst(turn: Any) -> Any:
+    def worst(turn):
         return 5e-5 * np.sum(np.abs(slopes(lambda **at: fourbar_angle(**at, crank=turn), FOURBAR, 3e-5)), axis=0)
 
     for key, end, sign in zip(("worst_case_lower", "worst_case_upper"), ends, (-1, 1), strict=True):
@@ -181,7 +177,7 @@ def test_worst_case_of_the_least_and_the_largest_deviation(rule: str, ends: tupl
 
 
 T = 5e-5
-DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
+DISTRIBUTIONS = {
     "normal": ({}, stats.norm(0, T / 3)),
     "normal, cp": ({"cp": 1.5}, stats.norm(0, T / 4.5)),
     "normal, cpk": ({"cp": 1.33, "cpk": 1.0}, stats.norm(T / 3 / 1.33 * 3 * 0.33, T / 3 / 1.33)),
@@ -198,7 +194,7 @@ DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
 
 
 @pytest.mark.parametrize("name", DISTRIBUTIONS)
-def test_moments_of_a_distribution(name: str) -> None:
+def test_moments_of_a_distribution(name):
     """Mean and standard deviation carried by the derivative, and every sample, against SciPy's distributions."""
     keys, law = DISTRIBUTIONS[name]
     mechanism = fourbar(tolerances={"l3": {"limits": "±0.05 mm"} | keys})
@@ -213,7 +209,7 @@ def test_moments_of_a_distribution(name: str) -> None:
     np.testing.assert_allclose(angles, fourbar_angle(**FOURBAR | {"l3": 0.09 + law.ppf(u[0])}), rtol=0, atol=1e-11)
 
 
-def test_limits_to_one_side() -> None:
+def test_limits_to_one_side():
     mechanism = fourbar(tolerances={"l2": "+0.04/-0.01 mm", "l4": "+0.03/+0.01 mm"})
     found = trunnion.tolerance(mechanism, methods=FAST)
     _, two, _, four = slopes(fourbar_angle, FOURBAR, 3e-5)
@@ -225,7 +221,7 @@ def test_limits_to_one_side() -> None:
     np.testing.assert_allclose(found["corner_upper"].values[0], [0.03 - 1e-5, 0.07 + 3e-5], rtol=1e-14)
 
 
-def test_number_that_follows_another() -> None:
+def test_number_that_follows_another():
     """The length of the coupler by a dimension, and where its pin is drilled from there: both move the pin."""
     mechanism = fourbar(tolerances={"l3": "±0.05 mm", "links.coupler.points.C.x": "±0.01 mm"})
     found = trunnion.tolerance(mechanism, methods=FAST)
@@ -236,7 +232,7 @@ def test_number_that_follows_another() -> None:
     assert found["searched_upper"].item() == pytest.approx(least, rel=1e-11)
 
 
-def test_play_of_a_fit() -> None:
+def test_play_of_a_fit():
     """Hole and pin with limits of their own: the worst case has the largest play, the scatter E ρ² of both radii."""
     pin = {"radius": "4.99 mm ± 0.003 mm", "hole_radius": "5 mm ± 0.005 mm"}
     joints = fourbar().data()["joints"]
@@ -253,7 +249,7 @@ def test_play_of_a_fit() -> None:
 
 
 FINE = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
-CURVES: dict[str, dict[str, Any]] = {
+CURVES = {
     "path": {"path_error": "coupler.C"},
     "place": {"path_error": "coupler.C", "at": "60 deg"},
     "rms": {"path_error": "coupler.C", "as": "rms"},
@@ -264,7 +260,7 @@ CURVES: dict[str, dict[str, Any]] = {
 }
 
 
-def of_courses(sizes: Any) -> dict[str, tuple[float, float]]:
+def of_courses(sizes):
     """Least and largest deviation of every figure above of one four-bar from the nominal one."""
     angle, nominal = (fourbar_angle(*one, crank=FINE) for one in (sizes, FOURBAR.values()))
     pin, meant = sizes[0] + sizes[3] * np.exp(1j * angle), FOURBAR["l1"] + FOURBAR["l4"] * np.exp(1j * nominal)
@@ -277,7 +273,7 @@ def of_courses(sizes: Any) -> dict[str, tuple[float, float]]:
     return found | {"error": (float(np.min(turned)), float(np.max(turned)))}
 
 
-def test_worst_case_of_figures_of_a_course() -> None:
+def test_worst_case_of_figures_of_a_course():
     """Found on the mechanism: the same as the best of all corners by the closed form."""
     found = trunnion.tolerance(fourbar(measures=CURVES), methods=FAST, steps=180)
     signs = itertools.product((-1, 0, 1), repeat=4)

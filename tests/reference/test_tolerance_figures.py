@@ -1,11 +1,9 @@
 """Figures of a study at their edge: what first order cannot know, what does not exist, what no model may have."""
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
 from mechanisms_parts import joined
@@ -17,13 +15,13 @@ ERROR = {"transmission_error": "D"}
 PATH = {"path_error": "coupler.C"}
 
 
-def studied(measure: dict[str, Any], methods: tuple[str, ...] = ("linear", "worst-case", "monte-carlo")) -> Any:
+def studied(measure, methods=("linear", "worst-case", "monte-carlo")):
     model = fourbar(measures={"it": measure})
     return tolerance(model, methods=methods, samples=1000, steps=36, jobs=1).isel(measure=0)
 
 
 @pytest.mark.parametrize("statistic", ["maximum", "mean"])
-def test_band_of_a_transmission_error_is_about_nominal(statistic: str) -> None:
+def test_band_of_a_transmission_error_is_about_nominal(statistic):
     """Half of the samples lie within ±0.6745 σ of no error, at every position, whatever figure is made of them."""
     found = studied({**ERROR, "as": statistic})
     quarter = 0.6745 * found.curve_deviation.values
@@ -34,7 +32,7 @@ def test_band_of_a_transmission_error_is_about_nominal(statistic: str) -> None:
 @pytest.mark.parametrize(
     "measure", [{**PATH, "as": one} for one in ("mean", "place-of-maximum")] + [{**ERROR, "as": "rms"}]
 )
-def test_first_order_of_what_has_no_derivative(measure: dict[str, Any]) -> None:
+def test_first_order_of_what_has_no_derivative(measure):
     """It says that it has none; a worst case is found all the same, no less than any sample."""
     found = studied(measure)
     for name in ("worst_case_upper", "rss", "deviation_linear"):
@@ -44,7 +42,7 @@ def test_first_order_of_what_has_no_derivative(measure: dict[str, Any]) -> None:
         assert found.searched_lower <= found.least - found.nominal + 1e-9 * abs(found.most)
 
 
-def test_figure_that_does_not_exist() -> None:
+def test_figure_that_does_not_exist():
     """No turning back between 10 and 20°: no nominal figure, no derivative, no worst case, and it is said."""
     found = studied({"dead_centre": "C", "over": ["10 deg", "20 deg"]})
     for name in ("nominal", "worst_case_upper", "deviation_linear", "searched_lower", "searched_upper", "mean"):
@@ -52,26 +50,26 @@ def test_figure_that_does_not_exist() -> None:
     assert found["yield"] == 0
 
 
-def test_nominal_outside_its_limits_is_no_worst_case() -> None:
+def test_nominal_outside_its_limits_is_no_worst_case():
     """Limits far from nominal at which nothing goes together: the nominal mechanism is not among the mechanisms."""
     model = fourbar(tolerances={"l1": "+0.9/+0.8 m"}, measures={"it": {"angle": "rocker"}})
     found = tolerance(model, methods=("worst-case",), steps=12)
     assert np.all(np.isnan([found.searched_lower, found.searched_upper]))
 
 
-def told(result: Any, key: str) -> dict[str, Any]:
+def told(result, key):
     return dict(zip(result.measure.values.tolist(), json.loads(result.attrs[key]), strict=True))
 
 
 WIDE = 0.05e-3 / 3  # σ of each length
 
 
-def correlated(rho: float, methods: tuple[str, ...] = ("linear",), **options: Any) -> xr.Dataset:
+def correlated(rho, methods=("linear",), **options):
     rows = [{"of": ["l2", "l3"], "coefficient": rho}, {"of": ["l3", "l4"], "coefficient": -rho / 2}]
     return trunnion.tolerance(fourbar(correlations=rows, **options), methods=methods, samples=4000)
 
 
-def drawn(rho: float, samples: int = 400_000) -> tuple[np.ndarray, np.ndarray]:
+def drawn(rho, samples=400_000):
     """Deviations of the four lengths, and the angle of each four-bar by its closed form."""
     matrix = np.eye(4)
     matrix[1, 2] = matrix[2, 1] = rho
@@ -81,7 +79,7 @@ def drawn(rho: float, samples: int = 400_000) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("rho", [0.6, -0.7])
-def test_shares_are_covariances_with_the_measure(rho: float) -> None:
+def test_shares_are_covariances_with_the_measure(rho):
     """Of samples: a number's part is its slope times its covariance with the angle; together the variance."""
     found = correlated(rho)
     off, angle = drawn(rho)
@@ -92,7 +90,7 @@ def test_shares_are_covariances_with_the_measure(rho: float) -> None:
     assert found["deviation_linear"].item() == pytest.approx(np.std(angle), rel=5e-3)
 
 
-def test_shares_with_plays_and_directions_add_up() -> None:
+def test_shares_with_plays_and_directions_add_up():
     """Zones are independent of the lengths, and their share is that of the deviation with all correlations."""
     joints = fourbar().data()["joints"]
     joints["C"] |= {"pin": {"clearance": "0.03 mm"}}
@@ -109,7 +107,7 @@ def test_shares_with_plays_and_directions_add_up() -> None:
     assert found["deviation"].item() == pytest.approx(found["deviation_linear"].item(), rel=0.04)
 
 
-def test_sizes_of_one_direction_go_with_each_other() -> None:
+def test_sizes_of_one_direction_go_with_each_other():
     """Two numbers make the offset that points anywhere: correlated they widen it, by samples as by first order."""
     data = slider_crank().data()
     data["dimensions"] |= {"e1": "0.2 mm", "e2": "0.1 mm"}
@@ -126,12 +124,12 @@ NOMINAL = float(fourbar_angle(**FOURBAR))
 COSTS = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm"} for name in FOURBAR}
 
 
-def missed(found: xr.Dataset) -> list[dict[str, Any]]:
+def missed(found):
     rows = json.loads(found.attrs["findings"])
     return [row for row in rows if row["severity"] == "error" and row["where"].startswith("measures.")]
 
 
-def made(**limits: Any) -> dict[str, Any]:
+def made(**limits):
     return {"measures": {"angle": {"angle": "rocker", "at": "60 deg", **limits}}}
 
 
@@ -145,14 +143,14 @@ def made(**limits: Any) -> dict[str, Any]:
         ({"at_least": NOMINAL - 1e-2, "at_most": NOMINAL + 1e-2}, ["linear", "monte-carlo"], ()),
     ],
 )
-def test_what_is_outside_the_limits(limits: dict[str, Any], methods: list[str], told: tuple[str, ...]) -> None:
+def test_what_is_outside_the_limits(limits, methods, told):
     rows = missed(trunnion.tolerance(fourbar(**made(**limits)), methods=methods, samples=2000))
     assert bool(rows) == bool(told)
     for word in told:
         assert word in rows[0]["what"]
 
 
-def test_what_is_allocated_keeps_the_limit() -> None:
+def test_what_is_allocated_keeps_the_limit():
     mechanism = fourbar(**made(limit="±0.1 deg"), costs=COSTS)
     found = trunnion.allocate(mechanism, samples=0)
     assert found.attrs["found"]
@@ -161,7 +159,7 @@ def test_what_is_allocated_keeps_the_limit() -> None:
 
 
 @pytest.mark.parametrize(("asked", "fine"), [(0.9, True), (0.9999, False)])
-def test_a_yield_that_is_asked_for_decides_alone(asked: float, fine: bool) -> None:
+def test_a_yield_that_is_asked_for_decides_alone(asked, fine):
     """The worst case is far outside either way."""
     mechanism = fourbar(**made(limit="±0.06 deg"))
     found = trunnion.tolerance(mechanism, samples=4000, target=asked)
@@ -183,7 +181,7 @@ ROD = {
 }
 
 
-def test_variance_based_indices_of_a_nearly_linear_measure() -> None:
+def test_variance_based_indices_of_a_nearly_linear_measure():
     """sin(angle) = h/(a + b): with small tolerances the indices are those of first order, alone and in total."""
     mechanism = Mechanism(**ROD, tolerances={"a": 1e-6, "b": 2e-6, "h": 1e-6})
     result = tolerance(mechanism, methods=["linear", "quasi-monte-carlo", "sobol"], samples=20_000)

@@ -1,14 +1,10 @@
 """Random samples against closed forms on the same and on other random numbers; intervals against true figures."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy import stats
 
 import trunnion
-from mechanisms import Array
 from toleranced import (
     CLUTCH,
     FOURBAR,
@@ -24,24 +20,22 @@ from toleranced import (
     slider_crank,
     slider_place,
 )  # fmt: skip
-from trunnion import Mechanism
 from trunnion.statistics.draws import sobol, uniforms
 from trunnion.studies.tolerance.linear import study
 
-Law = Callable[[Array], Array]
 MM = 1e-3
 
 
-def normal(width: float) -> Law:
+def normal(width):
     return lambda u: stats.norm.ppf(u) * width / 3
 
 
-def figures(mechanism: Mechanism, u: Array, **options: Any) -> Array:
+def figures(mechanism, u, **options):
     """Of the first measure."""
     return sampler(study(mechanism, **options)).figures(u)["figure"][0]
 
 
-CASES: dict[str, tuple[Mechanism, Callable[..., Any], Mapping[str, float], list[Law]]] = {
+CASES = {
     "clutch": (clutch(), clutch_angle, CLUTCH, [normal(0.0125 * MM), normal(0.01 * MM), normal(0.0125 * MM)]),
     "four-bar": (fourbar(), fourbar_angle, FOURBAR, [normal(0.05 * MM)] * 4),
     "four-bar, wide": (fourbar("±5 mm"), fourbar_angle, FOURBAR, [normal(5 * MM)] * 4),
@@ -52,7 +46,7 @@ CASES: dict[str, tuple[Mechanism, Callable[..., Any], Mapping[str, float], list[
 
 @pytest.mark.parametrize("method", ["plain", "sobol"])
 @pytest.mark.parametrize("name", CASES)
-def test_sample_by_sample(name: str, method: str) -> None:
+def test_sample_by_sample(name, method):
     """The same uniform numbers through SciPy's quantiles and the closed form: the same figure, to 1e-12."""
     mechanism, of, at, laws = CASES[name]
     dims = len(laws)
@@ -64,7 +58,7 @@ def test_sample_by_sample(name: str, method: str) -> None:
 T = 0.4 * MM
 
 
-def test_measured_numbers_sample_by_sample() -> None:
+def test_measured_numbers_sample_by_sample():
     """A number takes one of its measured values, each as often."""
     u = uniforms(2, 0, 1, 800)
     keys = {"distribution": "sample", "values": ["0.3 mm", "-0.1 mm", "0.05 mm", "0.2 mm"]}
@@ -73,7 +67,7 @@ def test_measured_numbers_sample_by_sample() -> None:
     np.testing.assert_allclose(found, fourbar_angle(**FOURBAR | {"l4": 0.07 + values}), rtol=0, atol=1e-11)
 
 
-def test_correlated_sample_by_sample() -> None:
+def test_correlated_sample_by_sample():
     """Lower Cholesky factor of the correlation times the normal scores; a uniform number by its copula."""
     tolerances = {"l1": "±0.4 mm", "l2": {"limits": "±0.4 mm", "distribution": "uniform"}, "l4": "±0.4 mm"}
     correlations = [{"of": ["l1", "l2"], "coefficient": 0.7}, {"of": ["l2", "l4"], "coefficient": -0.5}]
@@ -84,7 +78,7 @@ def test_correlated_sample_by_sample() -> None:
     np.testing.assert_allclose(found, own, rtol=0, atol=1e-12)
 
 
-def shifted(joint: str, x: Any, y: Any) -> Any:
+def shifted(joint, x, y):
     """The angle of the rocker, its pin off by (x, y) in the axes of the hole, which is in the second link."""
     l1, l2, l3, l4 = FOURBAR.values()
     if joint == "A":
@@ -96,13 +90,13 @@ def shifted(joint: str, x: Any, y: Any) -> Any:
     return fourbar_angle(l1, l2, l3, np.hypot(l4 - x, y)) - np.arctan2(-y, l4 - x)
 
 
-def joined(joint: str, **parts: Any) -> dict[str, Any]:
+def joined(joint, **parts):
     joints = fourbar().data()["joints"]
     return joints | {joint: {**joints[joint], **parts}}
 
 
 @pytest.mark.parametrize("joint", "ABCD")
-def test_pins_anywhere_in_their_holes_sample_by_sample(joint: str) -> None:
+def test_pins_anywhere_in_their_holes_sample_by_sample(joint):
     """Clearance of 0.2 mm ± 0.1 mm: uniform over the disc of its own radius."""
     pin = {"radius": "5 mm", "clearance": "0.2 mm ± 0.1 mm"}
     u = uniforms(2, 0, 3, 800)
@@ -113,7 +107,7 @@ def test_pins_anywhere_in_their_holes_sample_by_sample(joint: str) -> None:
 
 
 @pytest.mark.parametrize("joint", "ABCD")
-def test_seats_and_run_outs_sample_by_sample(joint: str) -> None:
+def test_seats_and_run_outs_sample_by_sample(joint):
     """A seat at any angle of a given play; a hole that is off by up to 0.2 mm in any direction."""
     u = uniforms(2, 0, 2, 400)
     xi = 2 * np.pi * u[0] - np.pi
@@ -138,7 +132,7 @@ SIGMA = np.linalg.norm([13.654, 13.401, 15.623, 6.323]) * 0.05e-3 / 3
 
 
 @pytest.fixture(scope="module")
-def plain() -> tuple[Any, Array]:
+def plain():
     """A run, and the same samples by the closed form."""
     mechanism, samples = fourbar(measures=LIMITS), 5000
     result = trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=samples, seed=9)
@@ -148,7 +142,7 @@ def plain() -> tuple[Any, Array]:
     return result, fourbar_angle(*(np.array(list(FOURBAR.values()))[:, None] + deviations))
 
 
-def test_moments(plain: tuple[Any, Array]) -> None:
+def test_moments(plain):
     result, own = plain
     assert result["samples"].item() == len(own) == 5000
     assert result["mean"].item() == pytest.approx(np.mean(own), rel=1e-14)
@@ -162,7 +156,7 @@ def test_moments(plain: tuple[Any, Array]) -> None:
     assert result["band"].values[0, :, 0] == pytest.approx(change, abs=0.1 * SIGMA)
 
 
-def test_quantiles(plain: tuple[Any, Array]) -> None:
+def test_quantiles(plain):
     """Within the width of a bin, 1/128 of σ near the middle; intervals from order statistics."""
     result, own = plain
     q = result["quantile"].values
@@ -176,7 +170,7 @@ def test_quantiles(plain: tuple[Any, Array]) -> None:
         assert found == pytest.approx(tuple(known), abs=0.05 * SIGMA if 0.01 < share < 0.99 else 0.3 * SIGMA)
 
 
-def test_intervals(plain: tuple[Any, Array]) -> None:
+def test_intervals(plain):
     result, own = plain
     mean = stats.ttest_1samp(own, 0).confidence_interval(0.95)
     assert (result["mean_low"].item(), result["mean_high"].item()) == pytest.approx(tuple(mean), rel=1e-9)
@@ -186,7 +180,7 @@ def test_intervals(plain: tuple[Any, Array]) -> None:
     assert found == pytest.approx(tuple(known), abs=0.3 * (known.high - known.low))
 
 
-def test_yield_and_capability(plain: tuple[Any, Array]) -> None:
+def test_yield_and_capability(plain):
     result, own = plain
     low, high = fourbar_angle(**FOURBAR) + np.radians([-0.07, 0.05])
     passed = int(np.count_nonzero((own >= low) & (own <= high)))
@@ -199,7 +193,7 @@ def test_yield_and_capability(plain: tuple[Any, Array]) -> None:
     assert result["cpk"].item() == pytest.approx(min(high - mean, mean - low) / (3 * sigma), rel=1e-9)
 
 
-def test_histogram_and_convergence(plain: tuple[Any, Array]) -> None:
+def test_histogram_and_convergence(plain):
     result, own = plain
     edges, counts = result["edge"].values[0], result["histogram"].values[0]
     assert np.sum(counts) == len(own)
@@ -212,7 +206,7 @@ def test_histogram_and_convergence(plain: tuple[Any, Array]) -> None:
         assert result["convergence_deviation"].values[0, i] == pytest.approx(np.std(own[:size], ddof=1), rel=1e-9)
 
 
-def test_sobol_points() -> None:
+def test_sobol_points():
     """Eight scramblings of a power of two of points each, their normal scores turned towards the gradient; intervals
     from their spread by Student's t.
     """
@@ -241,7 +235,7 @@ def test_sobol_points() -> None:
     assert found == pytest.approx((np.mean(shares) - half, np.mean(shares) + half), abs=0.12 * half)
 
 
-def test_large_tolerances_against_brute_force() -> None:
+def test_large_tolerances_against_brute_force():
     """±8 mm of each link, uniform: a million samples of one's own, with random numbers of another kind."""
     tolerances = {name: {"limits": "±8 mm", "distribution": "uniform"} for name in FOURBAR}
     measures = {

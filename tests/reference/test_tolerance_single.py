@@ -1,44 +1,37 @@
 """Samples analysed together in batches against each of them built as a mechanism of its own and analysed alone."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import mechanisms
 import mechanisms_space
 import trunnion
-from mechanisms_parts import Data
+from mechanisms_parts import EXAMPLES
 from toleranced import alone, sampler, varied
 from trunnion.algebra.dual import primal
 from trunnion.measures.many import figures_of
-from trunnion.measures.measures import Measure, coordinate_unit
+from trunnion.measures.measures import coordinate_unit
 from trunnion.measures.positions import moved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
-from trunnion.solve.run import Run, prepare
+from trunnion.solve.run import prepare
 from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.linear import study
 
-Array = NDArray[np.float64]
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 25
 DENSE = 20_000  # positions at which a largest deviation is as good as found
 
 
-def planar(name: str, **options: Any) -> Callable[[], Data]:
+def planar(name, **options):
     return lambda: mechanisms.model(mechanisms.MODELS[name](), **options)
 
 
-def spatial(name: str) -> Callable[[], Data]:
+def spatial(name):
     return lambda: mechanisms_space.MODELS[name]().data | {"joint_defaults": {"friction": 0.05}}
 
 
-def example(name: str) -> Callable[[], Data]:
-    def data() -> Data:
+def example(name):
+    def data():
         found = trunnion.read(EXAMPLES / f"{name}.yaml").data()
         plain = {key: value for key, value in found.items() if key not in ("measures", "tolerances", "costs")}
         sizes = found.get("dimensions", {}).items()
@@ -47,7 +40,7 @@ def example(name: str) -> Callable[[], Data]:
     return data
 
 
-CASES: dict[str, Callable[[], Data]] = {
+CASES = {
     **{name: planar(name) for name in mechanisms.MODELS},
     **{f"{law} friction": planar("slider-crank", friction=mechanisms.law_named(law))
        for law in ("stribeck", "brown-mcphee", "viscous", "dahl", "lugre")},
@@ -60,7 +53,7 @@ CASES: dict[str, Callable[[], Data]] = {
 }  # fmt: skip
 
 
-def measures_of(run: Run) -> list[str]:
+def measures_of(run):
     """Of every kind, as far as the mechanism has it."""
     mechanism = run.system.mechanism
     joints, driver = run.system.joints, next(iter(mechanism.drivers))
@@ -84,7 +77,7 @@ def measures_of(run: Run) -> list[str]:
 @pytest.mark.sample(8)
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
-def test_batches_against_mechanisms_of_their_own(name: str) -> None:
+def test_batches_against_mechanisms_of_their_own(name):
     """Every kind of measure and statistic: the same figure of each sample, or none for both."""
     mechanism = varied(CASES[name](), most=6 if CASES[name]().get("space") == "spatial" else 12)
     found = study(mechanism, measures_of(prepare(mechanism)))
@@ -121,7 +114,7 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
     assert np.all(status < 7)
 
 
-def solved(nominal: Run, other: Run) -> tuple[Any, Any]:
+def solved(nominal, other):
     """Both at many positions."""
     time = nominal.cycle.times(DENSE)
     if nominal.cycle.periodic:  # not at dead centres, where a jump has no value
@@ -130,7 +123,7 @@ def solved(nominal: Run, other: Run) -> tuple[Any, Any]:
     return one, two
 
 
-def deviations(one: Any, two: Any, nominal: Run, measure: Measure) -> tuple[Array, Array]:
+def deviations(one, two, nominal, measure):
     """Least and largest of what a course is off the nominal one at many positions: of a path its distance, twice."""
     courses = [
         np.array([np.broadcast_to(np.asarray(part, float), DENSE) for part in measure.curve(back)])
@@ -152,7 +145,7 @@ SMOOTH = ("mean", "rms", "maximum", "minimum", "efficiency", "peak-to-peak", "st
 @pytest.mark.parametrize(
     "name", ["four-bar", "class III", "geared five-bar", "Cardan", "lamp", "RCCC", "lugre friction"]
 )
-def test_derivatives_against_samples(name: str) -> None:
+def test_derivatives_against_samples(name):
     """∂y/∂p of figures that have a derivative: by dual numbers, and by samples on both sides."""
     mechanism = varied(CASES[name](), most=5)
     wanted = [one for one in measures_of(prepare(mechanism)) if one.startswith(SMOOTH) and "error" not in one]

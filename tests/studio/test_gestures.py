@@ -230,7 +230,7 @@ def test_a_load_against_the_motion_takes_power_from_a_slide_whichever_way_it_goe
     np.testing.assert_array_equal(np.array(acts)[clear], np.where(ahead < 0, 1, 0)[clear])
 
 
-def test_the_mass_of_a_flat_bar_is_that_of_its_section() -> None:
+def test_the_mass_of_a_flat_bar_is_that_of_its_section():
     """m = ρ l b t, J = m (l² + b²)/12 about the middle: 7850 · 0.1 · 0.02 · 0.01 = 0.157 kg, 1.36067e-4 kg m²."""
     text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
     bar = {"do": "bar-mass", "link": "link1", "width": "20 mm", "thickness": "10 mm"}

@@ -275,8 +275,7 @@ def test_one_question_of_a_drag_is_under_way_and_the_newest_is_asked_next(user):
     user.page.mouse.up()
     user.page.keyboard.up("Alt")
     user.until("s.live.value === null && s.past.value.length === 1")
-    under_way = np.cumsum([1 if one else -1 for one in asked if one != ()])
-    assert max(under_way) == 1
+    assert max(np.cumsum([1 if one else -1 for one in asked if one != ()])) == 1
     assert 1 < len(places) < 60
     assert places[-1][1] == max(place[1] for place in places)
     there = user.handle("C")

@@ -93,7 +93,7 @@ def test_two_variants_are_compared(user):
     assert user.page.locator(".changes").count() == 0
 
 
-def test_every_column_of_the_table_can_be_a_curve() -> None:
+def test_every_column_of_the_table_can_be_a_curve():
     """Names, units and values are those of the table that is written."""
     text = EXAMPLES["durango-fourbar"]
     question = {"ask": "curves", "text": text, "revision": 1, "names": ["coupler.angle_velocity", "A.effort", "none"]}

@@ -330,7 +330,7 @@ def test_nobody_else_may_ask(served, how):
         socket_of(served, **how)
 
 
-def test_a_dropped_file_of_another_program_becomes_a_model(served, tmp_path) -> None:
+def test_a_dropped_file_of_another_program_becomes_a_model(served, tmp_path):
     mechanism = model_of(EXAMPLES["durango-fourbar"])
     path = tmp_path / "arm.urdf"
     trunnion.exchange.export_model(mechanism, path, at="60 deg")

@@ -38,7 +38,7 @@ def ended(jobs, number, longest=120.0):
     pytest.fail(f"still running: {job}")
 
 
-def test_every_study_has_the_options_of_its_verb() -> None:
+def test_every_study_has_the_options_of_its_verb():
     """And none that writes a file."""
     commands = get_command(app).commands
     for form in forms():
@@ -48,7 +48,7 @@ def test_every_study_has_the_options_of_its_verb() -> None:
 
 
 @pytest.mark.slow
-def test_the_report_of_a_study_is_that_of_its_verb(jobs, tmp_path) -> None:
+def test_the_report_of_a_study_is_that_of_its_verb(jobs, tmp_path):
     number = jobs.start(
         {"text": PLAYING, "verb": "play", "options": {"--steps": "36", "--measure": ["effort:A", "rocker.C.x"]}},
         "model.yaml", None,
@@ -64,7 +64,7 @@ def test_the_report_of_a_study_is_that_of_its_verb(jobs, tmp_path) -> None:
     assert own == other
 
 
-def test_a_study_is_stopped_and_tells_how_far_it_is(jobs) -> None:
+def test_a_study_is_stopped_and_tells_how_far_it_is(jobs):
     options = {"--samples": "3000000", "--method": "monte-carlo"}
     number = jobs.start({"text": TOLERANCED, "verb": "tolerance", "options": options}, "model.yaml", None)
     limit = time.monotonic() + 60
@@ -79,7 +79,7 @@ def test_a_study_is_stopped_and_tells_how_far_it_is(jobs) -> None:
     assert "\x1e" not in job["output"]
 
 
-def test_what_is_wrong_with_a_model_is_its_output(jobs) -> None:
+def test_what_is_wrong_with_a_model_is_its_output(jobs):
     asked = {"text": "trunnion: 1\nlinks: {}\n", "verb": "play", "options": {}}
     job = ended(jobs, jobs.start(asked, "model.yaml", None))
     assert job["status"] == 2
@@ -97,13 +97,13 @@ def test_what_is_wrong_with_a_model_is_its_output(jobs) -> None:
         ({"verb": "compare"}, "mapping"),
     ],
 )
-def test_nothing_but_the_options_of_a_form_is_started(jobs, asked, words) -> None:
+def test_nothing_but_the_options_of_a_form_is_started(jobs, asked, words):
     with pytest.raises(ValueError, match=words):
         jobs.start({"text": TOLERANCED, **asked}, "model.yaml", None)
     assert jobs.told() == []
 
 
-def test_a_value_is_never_an_option(jobs) -> None:
+def test_a_value_is_never_an_option(jobs):
     asked = {"text": PLAYING, "verb": "play", "options": {"--at": "--report=/tmp/x.html"}}
     job = ended(jobs, jobs.start(asked, "model.yaml", None))
     assert job["status"] == 2
@@ -111,7 +111,7 @@ def test_a_value_is_never_an_option(jobs) -> None:
 
 
 @pytest.mark.slow
-def test_a_chip_opens_its_study_and_the_report_is_read_in_the_page(user) -> None:
+def test_a_chip_opens_its_study_and_the_report_is_read_in_the_page(user):
     user.until("s.solved.value")
     page = user.page
     page.locator(".chip", has_text="tolerance").click()

@@ -37,7 +37,7 @@ def widget():
     made.close()
 
 
-def test_the_kernel_answers_as_the_server_does(widget) -> None:
+def test_the_kernel_answers_as_the_server_does(widget):
     sent = []
     widget.send = lambda content, buffers=None: sent.append((content, buffers))
     question = json.dumps({"ask": "model", "text": widget.text, "revision": 3, "steps": 60})
@@ -53,7 +53,7 @@ def test_the_kernel_answers_as_the_server_does(widget) -> None:
         assert sent.pop()[0]["status"] == status, path
 
 
-def test_it_follows_what_is_saved_and_asked_in_the_cell(widget) -> None:
+def test_it_follows_what_is_saved_and_asked_in_the_cell(widget):
     widget.send = lambda *_: None
     text = widget.text.replace("2.00 m", "2.10 m")
     assert text != widget.text
@@ -99,7 +99,7 @@ def cell(browser, widget):
 
 
 @pytest.mark.slow
-def test_a_cell_opens_drags_and_gives_the_changed_mechanism_back(cell, widget) -> None:
+def test_a_cell_opens_drags_and_gives_the_changed_mechanism_back(cell, widget):
     frame, pump = cell
     pump(lambda: frame.locator(".formula .term").count() == 2)
     assert frame.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]

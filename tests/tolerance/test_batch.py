@@ -8,11 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -30,8 +28,8 @@ WAYS = [{"jobs": 1}, {"jobs": 2}]
 
 
 @pytest.mark.parametrize("way", [*WAYS, {"jobs": 1, "threads": True}, {"jobs": 2, "threads": True}])
-def test_the_same_bits_in_every_way(way: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
-    shares: list[float] = []
+def test_the_same_bits_in_every_way(way, capfd):
+    shares = []
     parts, trouble = run(ToyJob(), progress=shares.append, **way)
     assert bits(parts) == EXPECTED
     assert not trouble
@@ -42,7 +40,7 @@ def test_the_same_bits_in_every_way(way: dict[str, Any], capfd: pytest.CaptureFi
 
 @POSIX
 @pytest.mark.parametrize("fault", ["", "deaf"])
-def test_a_killed_worker_costs_time_only(fault: str, tmp_path: Path) -> None:
+def test_a_killed_worker_costs_time_only(fault, tmp_path):
     """Also where others do not hear that they are to end."""
     assert bits(run(ToyJob(fatal=17, folder=tmp_path, fault=fault), jobs=2)[0]) == EXPECTED
     assert (tmp_path / "perished").exists()
@@ -50,14 +48,14 @@ def test_a_killed_worker_costs_time_only(fault: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @POSIX
-def test_a_block_that_kills_every_worker_is_an_error() -> None:
+def test_a_block_that_kills_every_worker_is_an_error():
     with pytest.raises(MechanismError, match="3 workers died in turn, the next block being 0"):
         run(ToyJob(fatal=0), jobs=2)
     assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_what_a_job_raises_arrives(way: dict[str, Any], tmp_path: Path) -> None:
+def test_what_a_job_raises_arrives(way, tmp_path):
     with pytest.raises(MechanismError) as caught:
         run(ToyJob(fault="prepare"), **way)
     assert caught.value.findings == (Finding("no such link", "links.x", "name one"),)
@@ -70,7 +68,7 @@ def test_what_a_job_raises_arrives(way: dict[str, Any], tmp_path: Path) -> None:
 @pytest.mark.slow
 @POSIX
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
+def test_ctrl_c_from_the_terminal_is_quiet(jobs, tmp_path):
     lines, complaints = interrupted(tmp_path, jobs)
     assert lines[-1] == "stopped"
     assert complaints == ""
@@ -79,23 +77,23 @@ def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_ctrl_c_keeps_what_is_done(jobs: int, tmp_path: Path) -> None:
+def test_ctrl_c_keeps_what_is_done(jobs, tmp_path):
     path = tmp_path / "run.trn"
 
-    def press(share: float) -> None:
+    def press(share):
         if share > 0.3:
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
         run(ToyJob(), jobs=jobs, checkpoint=path, progress=press)
     assert not multiprocessing.active_children()
-    shares: list[float] = []
+    shares = []
     assert bits(run(ToyJob(), jobs=3 - jobs, checkpoint=path, progress=shares.append)[0]) == EXPECTED
     assert 0.3 < shares[0] < 1.0
 
 
 @POSIX
-def test_workers_end_with_a_main_process_that_is_killed(tmp_path: Path) -> None:
+def test_workers_end_with_a_main_process_that_is_killed(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import multiprocessing, sys\nfrom toy_job import ToyJob\nfrom trunnion.studies.batch import run\n"
@@ -114,7 +112,7 @@ def test_workers_end_with_a_main_process_that_is_killed(tmp_path: Path) -> None:
     assert not any(_lives(worker) for worker in workers)
 
 
-def _lives(process: int) -> bool:
+def _lives(process):
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -124,7 +122,7 @@ def _lives(process: int) -> bool:
 
 
 @contextmanager
-def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+def program(*arguments):
     """A Dask program in a process of its own."""
     command = [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]]
     null = subprocess.DEVNULL
@@ -136,7 +134,7 @@ def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 
 @contextmanager
-def cluster(folder: Path, threads: int) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+def cluster(folder, threads):
     """The address and the process of a scheduler with one worker of so many threads."""
     told = folder / "scheduler.json"
     here = ("--scheduler-file", str(told))
@@ -151,7 +149,7 @@ def cluster(folder: Path, threads: int) -> Iterator[tuple[str, subprocess.Popen[
 
 @DASK
 @pytest.mark.slow
-def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_cluster_by_its_address(tmp_path, capfd):
     """Also where a block kills a worker once, or always."""
     pytest.importorskip("distributed")  # which sets its level as it is imported
     level = logging.getLogger("distributed").level
@@ -168,26 +166,24 @@ def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[s
 
 @DASK
 @pytest.mark.slow
-def test_a_scheduler_that_goes_away_is_an_error_and_nothing_is_lost(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_that_goes_away_is_an_error_and_nothing_is_lost(tmp_path, capfd, monkeypatch):
     path = tmp_path / "run.trn"
     with cluster(tmp_path, 1) as (address, scheduler):
 
-        def kill(share: float) -> None:
+        def kill(share):
             if share > 0.3:
                 scheduler.kill()
 
         with pytest.raises(MechanismError, match="connection with the scheduler"):
             run(ToyJob(pause=0.01), cluster=address, checkpoint=path, progress=kill)
-    shares: list[float] = []
+    shares = []
     assert bits(run(ToyJob(), checkpoint=path, progress=shares.append)[0]) == EXPECTED
     assert shares[0] > 0.3
     assert capfd.readouterr() == ("", "")
 
 
 @DASK
-def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_scheduler_is_one_finding(monkeypatch):
     from trunnion.studies import cluster as module
 
     monkeypatch.setattr(module, "CONNECT", 0.5)
@@ -198,7 +194,7 @@ def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(caught.value.findings) == 1
 
 
-def test_without_dask_the_remedy_is_told() -> None:
+def test_without_dask_the_remedy_is_told():
     script = (
         "import sys; sys.modules['distributed'] = None\n"
         "from toy_job import ToyJob\nfrom trunnion.studies.batch import run\n"

@@ -6,7 +6,6 @@ import random
 import re
 import signal
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ import xarray as xr
 import trunnion
 from toleranced import fourbar
 from toy_job import ToyJob, bits
-from trunnion import Mechanism, MechanismError
+from trunnion import MechanismError
 from trunnion.studies import batch as module
 from trunnion.studies.batch import Checkpoint, run, settings
 from trunnion.studies.tolerance.linear import study
@@ -24,7 +23,7 @@ EXPECTED = bits([ToyJob()(block) for block in range(37)])
 
 
 @pytest.fixture
-def begun(tmp_path: Path) -> Path:
+def begun(tmp_path):
     """A checkpoint of blocks 0 to 9 and 20 to 24 of 37."""
     path = tmp_path / "run.trn"
     done = Checkpoint(path, ToyJob())
@@ -34,7 +33,7 @@ def begun(tmp_path: Path) -> Path:
     return path
 
 
-def refusal(path: Path, job: ToyJob) -> str:
+def refusal(path, job):
     """The one finding."""
     with pytest.raises(MechanismError) as caught:
         run(job, checkpoint=path)
@@ -44,11 +43,11 @@ def refusal(path: Path, job: ToyJob) -> str:
     return finding.what
 
 
-def content(folder: Path) -> dict[str, bytes]:
+def content(folder):
     return {file.name: file.read_bytes() for file in folder.iterdir()}
 
 
-def test_a_finished_run_is_read_only(begun: Path) -> None:
+def test_a_finished_run_is_read_only(begun):
     run(ToyJob(), checkpoint=begun)
     before, shares = content(begun), list[float]()
     assert bits(run(ToyJob(fault="prepare"), checkpoint=begun, progress=shares.append)[0]) == EXPECTED
@@ -56,7 +55,7 @@ def test_a_finished_run_is_read_only(begun: Path) -> None:
     assert content(begun) == before
 
 
-def test_another_job_is_named(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_job_is_named(begun, monkeypatch):
     before = content(begun)
     other = ToyJob(seed=2, model={"AB": 2.1})
     assert re.fullmatch(
@@ -68,7 +67,7 @@ def test_another_job_is_named(begun: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert content(begun) == before
 
 
-def test_damage_costs_blocks_and_never_bits(begun: Path) -> None:
+def test_damage_costs_blocks_and_never_bits(begun):
     """Single bits changed anywhere in a block, and ends cut off, as by a power cut: the block is done again."""
     file, chance = begun / "7.npz", random.Random(1)
     sound = file.read_bytes()
@@ -86,7 +85,7 @@ def test_damage_costs_blocks_and_never_bits(begun: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "AB: 2 m\n", "PK\x03\x04", "5", "[]", "null", "{"])
-def test_other_folders_are_refused_and_stay(tmp_path: Path, text: str) -> None:
+def test_other_folders_are_refused_and_stay(tmp_path, text):
     (tmp_path / "job.json").write_text(text)
     (tmp_path / "model.yaml").write_text("AB: 2 m\n")
     before = content(tmp_path)
@@ -94,14 +93,14 @@ def test_other_folders_are_refused_and_stay(tmp_path: Path, text: str) -> None:
     assert content(tmp_path) == before
 
 
-def test_no_place_to_write_is_known_at_once(tmp_path: Path) -> None:
+def test_no_place_to_write_is_known_at_once(tmp_path):
     assert "cannot be used" in refusal(tmp_path / "none" / "run.trn", ToyJob(fault="evaluate"))
     (tmp_path / "file").write_text("")
     assert "cannot be used" in refusal(tmp_path / "file", ToyJob(fault="evaluate"))
 
 
-def test_a_full_disk_does_not_end_the_run(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(place: Path, raw: bytes) -> None:
+def test_a_full_disk_does_not_end_the_run(begun, monkeypatch):
+    def full(place, raw):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(module, "_write", full)
@@ -113,7 +112,7 @@ def test_a_full_disk_does_not_end_the_run(begun: Path, monkeypatch: pytest.Monke
     assert {30, 31} < set(done.parts)
 
 
-def test_the_settings_are_of_the_job_alone() -> None:
+def test_the_settings_are_of_the_job_alone():
     assert settings(ToyJob()) == settings(ToyJob(pause=1.0, folder=Path()))
     assert settings(ToyJob()) != settings(ToyJob(seed=2))
     arrays = [ToyJob(model={"a": np.linspace(0.0, last, 2000)}) for last in (1.0, 1.0, 1.0 + 1e-12)]
@@ -124,7 +123,7 @@ def test_the_settings_are_of_the_job_alone() -> None:
 SAMPLES, STEPS = 3000, 120
 
 
-def mechanism() -> Mechanism:
+def mechanism():
     """A four-bar with friction, a play, correlated lengths, other distributions, and some that do not go together."""
     joints = fourbar().data()["joints"]
     joints["B"]["pin"] = {"radius": "5 mm", "clearance": "0.03 mm ± 0.01 mm"}
@@ -147,15 +146,15 @@ def mechanism() -> Mechanism:
 
 
 @pytest.mark.slow
-def test_stopped_and_resumed(tmp_path: Path) -> None:
+def test_stopped_and_resumed(tmp_path):
     """Ctrl-C after some blocks, the rest by two workers: the same Dataset as in one go, to the last bit."""
     path = tmp_path / "run.trn"
 
-    def stop(samples: int) -> None:
+    def stop(samples):
         if samples > 900:
             signal.raise_signal(signal.SIGINT)
 
-    asked: Any = {"samples": SAMPLES, "steps": STEPS, "methods": ("linear", "monte-carlo")}
+    asked = {"samples": SAMPLES, "steps": STEPS, "methods": ("linear", "monte-carlo")}
     with pytest.raises(KeyboardInterrupt, match=r"run\.trn: the same command goes on"):
         trunnion.tolerance(mechanism(), seed=5, checkpoint=path, progress=stop, **asked)
     rest = trunnion.tolerance(mechanism(), seed=5, jobs=2, checkpoint=path, **asked)
@@ -165,7 +164,7 @@ def test_stopped_and_resumed(tmp_path: Path) -> None:
         trunnion.tolerance(mechanism(), seed=6, checkpoint=path, **asked)
 
 
-def test_seed_and_only_the_seed_changes_samples() -> None:
+def test_seed_and_only_the_seed_changes_samples():
     """Fewer samples are the first ones; other measures see the same mechanisms."""
     assert study(fourbar()).sampling("monte-carlo", 16384, 1).block_size == 2048
     found = [

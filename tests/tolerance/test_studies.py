@@ -1,15 +1,13 @@
 """Studies of tolerances: at the edge, of pins in seats, and what they say beside their figures."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
 import trunnion
-from mechanisms import Array
+from mechanisms_parts import example
 from toleranced import FOURBAR, fourbar, fourbar_angle, many
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.statistics.draws import uniforms
@@ -18,24 +16,24 @@ from trunnion.studies.tolerance.linear import study
 LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
 
 
-def findings(result: Any) -> list[str]:
+def findings(result):
     return [row["what"] for row in json.loads(result.attrs["findings"])]
 
 
-def own_uniforms(seed: int, count: int) -> Array:
+def own_uniforms(seed, count):
     """The uniform numbers of a run of the four-bar, from the streams themselves."""
     size = study(fourbar(measures=LIMIT)).sampling("monte-carlo", count, seed).drawing
     blocks = [uniforms(seed, i, 4, min(size, count - i * size)) for i in range(-(-count // size))]
     return np.concatenate(blocks, axis=1)
 
 
-def own_samples(seed: int, count: int, sigma: float) -> list[Any]:
+def own_samples(seed, count, sigma):
     z = stats.norm.ppf(own_uniforms(seed, count))
     return [value + sigma * row for value, row in zip(FOURBAR.values(), z, strict=True)]
 
 
 # samples without an answer
-def test_samples_that_do_not_go_together_at_a_place() -> None:
+def test_samples_that_do_not_go_together_at_a_place():
     """Counted by cause and as outside every limit; moments, quantiles and extremes are of the others."""
     widths = {"l1": 0.028, "l2": 0.028, "l3": 0.04, "l4": 0.04}
     mechanism = fourbar(
@@ -66,7 +64,7 @@ def test_samples_that_do_not_go_together_at_a_place() -> None:
     assert Status.NOT_ASSEMBLED.text in said
 
 
-def test_samples_that_do_not_go_together_everywhere() -> None:
+def test_samples_that_do_not_go_together_everywhere():
     """A measure over the turn needs all positions; one of a place only its own, but the sample fails for both."""
     measures = {"turn": {"angle": "rocker"}, "place": {"angle": "rocker", "at": "60 deg"}}
     result = trunnion.tolerance(
@@ -84,7 +82,7 @@ def test_samples_that_do_not_go_together_everywhere() -> None:
 
 @pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
 @pytest.mark.parametrize("samples", [1, 2, 7, 8])
-def test_few_samples(method: str, samples: int) -> None:
+def test_few_samples(method, samples):
     result = trunnion.tolerance(fourbar(measures=LIMIT), methods=["linear", method], samples=samples, seed=2)
     done = result["samples"].item()
     assert done == (samples if method == "monte-carlo" else 8)
@@ -94,7 +92,7 @@ def test_few_samples(method: str, samples: int) -> None:
     assert 0 < result["yield_low"].item() < result["yield_high"].item() == 1
 
 
-def test_limits_of_a_measure_over_the_turn() -> None:
+def test_limits_of_a_measure_over_the_turn():
     """Its largest |deviation| is the figure; limits hold of the signed deviation at every position."""
     found, batch = many(fourbar(measures={"angle": {"angle": "rocker", "limit": "+0.06/-0.1 deg"}}), 500)
     part = batch.figures(uniforms(1, 0, 4, 500), 500)
@@ -109,7 +107,7 @@ def test_limits_of_a_measure_over_the_turn() -> None:
     assert 0 < np.sum(kept) < 500
 
 
-REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+REFUSED = {
     "nothing varies": ({"tolerances": {}}, {}, "nothing has a tolerance"),
     "no such measure": ({}, {"measures": ["bogus"]}, "is no measure"),
     "no such point": ({}, {"measures": ["rocker.Q.x"]}, "--measure rocker.Q.x: there is no point 'rocker.Q'"),
@@ -133,22 +131,19 @@ REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_refused_with_a_finding(name: str) -> None:
+def test_refused_with_a_finding(name):
     model, options, said = REFUSED[name]
     with pytest.raises(MechanismError, match=said):
         trunnion.tolerance(fourbar(**model), **{"samples": 10, **options})
-
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 PLAYS = ("O", "A", "P", "K")
 ALPHA = np.arcsin(1.02 / 200)  # of both toggle links to the line: 1 mm from it, and the play of the cylinder's pin
 
 
-def press(seat: str | None = "loaded") -> Mechanism:
+def press(seat="loaded"):
     """The toggle press without friction, 0.02 ± 0.01 mm of play in its pins; it dwells from 1.5 to 2 s."""
-    data = trunnion.read(EXAMPLES / "toggle-press.yaml").data()
+    data = example("toggle-press").data()
     data["joint_defaults"] = {"pin": {"radius": "20 mm"}}
     for name in PLAYS:
         data["joints"][name]["pin"] = {"radius": "20 mm", "clearance": "0.02 mm"}
@@ -159,7 +154,7 @@ def press(seat: str | None = "loaded") -> Mechanism:
 
 
 @pytest.mark.slow
-def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
+def test_the_plays_of_a_press_add_up_by_virtual_work():
     """By Σ Q·c = F δ each pin moves the punch by ρ |Q|/F: 1/cos α of a toggle's pins, 2 tan α of the cylinder's."""
     found = trunnion.tolerance(press(), methods=["linear", "worst-case", "monte-carlo"], samples=24, jobs=1)
     closed = np.array([1 / np.cos(ALPHA)] * 3 + [2 * np.tan(ALPHA)])
@@ -172,9 +167,9 @@ def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
     assert found.nominal.values[0] - free.nominal.values[0] == pytest.approx(2e-5 * np.sum(closed), rel=1e-3)
 
 
-def test_samples_are_what_analyse_has_of_each() -> None:
+def test_samples_are_what_analyse_has_of_each():
     """Figures of a loaded four-bar, at a place, over the turn, and against the nominal one, sample by sample."""
-    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data = example("fourbar-with-play").data()
     data["tolerances"] = {"crank": "±0.02 mm", "rocker": "±0.03 mm", "B.pin.clearance": "±0.005 mm"}
     data["measures"] = {
         "torque": {"effort": "A", "as": "maximum"}, "lean": {"rotation": "D", "at": "60 deg"},
@@ -186,14 +181,14 @@ def test_samples_are_what_analyse_has_of_each() -> None:
     values, part = sampler.inputs.values(u), sampler.figures(u)
     nominal = trunnion.analyse(mechanism, steps=720)
     for k in range(3):  # no pin changes sides between 60° and 150°
-        numbers: dict[str, Any] = {path: float(np.ravel(values[path])[k]) for path in sampler.inputs.names}
+        numbers = {path: float(np.ravel(values[path])[k]) for path in sampler.inputs.names}
         alone = trunnion.analyse(mechanism.with_values(numbers), steps=720)
         assert part["figure"][:3, k] == pytest.approx(alone.measure_figure.values[:3], rel=1e-7)
         turned = [one.joint_rotation.sel(joint="D").values[120:301] for one in (alone, nominal)]
         assert part["figure"][3, k] == pytest.approx(np.max(np.abs(turned[0] - turned[1])), rel=1e-4)
 
 
-def test_the_only_number_has_the_whole_scatter_of_the_only_measure() -> None:
+def test_the_only_number_has_the_whole_scatter_of_the_only_measure():
     """scipy's estimators fail for one measure of one number."""
     result = trunnion.tolerance(
         fourbar(measures=LIMIT, tolerances={"l4": "±0.05 mm"}), methods=["linear", "sobol"], samples=16_000

@@ -1,14 +1,12 @@
 """Mechanisms with errors for the views: seats that follow the load, one that is given, errors of dimensions."""
 
-from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 
 import trunnion
+from mechanisms_parts import EXAMPLES
 from trunnion import Mechanism
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
 FOUR_BAR = """
 trunnion: 1

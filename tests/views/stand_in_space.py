@@ -1,15 +1,14 @@
 """Spatial results of every kind that a view must bear: an RSSR, a Cardan joint, chains with a joint of every pair."""
 
 from functools import cache
-from pathlib import Path
 
 from stand_in import blank
 
 import trunnion
+from mechanisms_parts import example
 from mechanisms_space import chain
 from trunnion.errors import Status
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 # closed chains and seeds whose joint B is of the pair that is named
 CHAINS = {"helical": ("RHSC", 1), "planar": ("RECR", 1), "universal": ("RUSR", 4), "prismatic": ("RPSC", 404),
           "fixed": ("RFSCR", 404)}  # fmt: skip
@@ -19,7 +18,7 @@ CHAINS = {"helical": ("RHSC", 1), "planar": ("RECR", 1), "universal": ("RUSR", 4
 def _analysed(name, count):
     if name in CHAINS:
         return trunnion.analyse(trunnion.Mechanism(**chain(*CHAINS[name]).data), count)
-    data = trunnion.read(EXAMPLES / f"{name}.yaml").data()
+    data = example(name).data()
     if name == "rssr":
         data["links"]["rod"]["points"]["E"] = [0.06, 0.03, 0]
         data["links"]["rocker"]["points"]["tip"] = [0.11, 0, "s4"]

@@ -61,15 +61,10 @@ def odd_names():
 CASES = {
     "plain": toleranced,
     "one position": lambda: toleranced(measure={"angle": "rocker", "at": "60 deg", "limit": "+0.1/-0.05 deg"}),
-    "structure": structure,
-    "torque": lambda: toleranced(measure={"effort": "A", "as": "maximum"}),
-    "no limits": lambda: toleranced(measure={"angle": "rocker"}),
-    "failures": lambda: toleranced(crank="59.9 mm"),
+    "structure": structure, "torque": lambda: toleranced(measure={"effort": "A", "as": "maximum"}),
+    "no limits": lambda: toleranced(measure={"angle": "rocker"}), "failures": lambda: toleranced(crank="59.9 mm"),
     "linear only": lambda: toleranced(methods=("linear",)),
     "sobol": lambda: toleranced(methods=("linear", "quasi-monte-carlo", "sobol")),
-    "all within": lambda: toleranced(half="0.02 mm"),
-    "twelve measures": lambda: toleranced(24, 200, measures=12),
-    "thirty parameters": lambda: toleranced(more=26),
-    "odd names": odd_names,
-    "gap": lambda: toleranced(crank="62 mm"),
-}
+    "all within": lambda: toleranced(half="0.02 mm"), "twelve measures": lambda: toleranced(24, 200, measures=12),
+    "thirty parameters": lambda: toleranced(more=26), "odd names": odd_names, "gap": lambda: toleranced(crank="62 mm"),
+}  # fmt: skip

@@ -3,15 +3,11 @@
 import functools
 import json
 import math
-from collections.abc import Callable
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-import xarray as xr
 from test_report import Page
 from test_scene import NODE, run
 
@@ -34,32 +30,32 @@ FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}
 
 
 @cache
-def start() -> xr.Dataset:
+def start():
     return simulate(slider_crank(), 0.5, 100)
 
 
 @cache
-def run_down() -> xr.Dataset:
+def run_down():
     return simulate(slider_crank(drivers=FREE), 2.0, 80)
 
 
 @cache
-def stays() -> xr.Dataset:
+def stays():
     return simulate(wheel({"kind": "constant", "effort": 0.5}), 1.0, 10)
 
 
 @cache
-def swing() -> xr.Dataset:
+def swing():
     """Without friction and motor: rounding is all that the effort is."""
     return simulate(three_posts(), 1.0, 50)
 
 
 @cache
-def ends_early() -> xr.Dataset:
+def ends_early():
     return simulate(wheel({"kind": "constant", "effort": 4}, range=[-1, 2]), 1.0, 40)
 
 
-CASES: dict[str, Callable[[], xr.Dataset]] = {
+CASES = {
     "start": start, "run-down": run_down, "stays": stays, "swing": swing, "ends early": ends_early,
 }  # fmt: skip
 EVENTS = {
@@ -70,12 +66,12 @@ EVENTS = {
 
 
 @pytest.fixture(scope="module", params=CASES)
-def motion(request: pytest.FixtureRequest) -> tuple[str, xr.Dataset]:
+def motion(request):
     return request.param, CASES[request.param]()
 
 
 @pytest.mark.spread(0, "stays", "ends early")
-def test_the_page_is_well_formed_and_speaks_of_time(motion: tuple[str, xr.Dataset]) -> None:
+def test_the_page_is_well_formed_and_speaks_of_time(motion):
     name, result = motion
     page = Page(report(result))
     assert not page.open
@@ -92,7 +88,7 @@ def test_the_page_is_well_formed_and_speaks_of_time(motion: tuple[str, xr.Datase
 
 
 @pytest.mark.spread(0, "ends early")
-def test_speeds_and_energies_are_those_of_the_result(motion: tuple[str, xr.Dataset]) -> None:
+def test_speeds_and_energies_are_those_of_the_result(motion):
     _, result = motion
     scene = motion_scene(shown(result))
     (free,) = scene["motion"]["free"]
@@ -105,7 +101,7 @@ def test_speeds_and_energies_are_those_of_the_result(motion: tuple[str, xr.Datas
     assert len(json.dumps(scene, allow_nan=False)) < 1_500_000
 
 
-def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
+def test_a_motion_that_ends_early_is_shown_to_its_end():
     result = ends_early()
     motion = shown(result)
     # 3.4 N m on 0.05 kg m² over 3 rad
@@ -116,7 +112,7 @@ def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     assert "then the motion ends" in " ".join(Page(report(result)).words)
 
 
-def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
+def test_the_speed_over_a_cycle_is_drawn_where_it_varies():
     """Cycloidal: (φ/T) (1 − cos 2π t/T)."""
     data = four_bar()
     law = {"law": "cycloidal", "range": [0.3, 1.2], "duration": 2.0, "returns": False}
@@ -134,7 +130,7 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
 @pytest.mark.sample(6)
 @pytest.mark.spread(0, "ends early-sheet", "ends early-phase", "stays-energy")
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in OF_CONTACTS])
-def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: str) -> None:
+def test_every_figure_bears_every_motion(motion, kind):
     name, result = motion
     drawn = plot(result, kind)
     drawn.canvas.draw()
@@ -151,13 +147,13 @@ def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: s
 
 if NODE:
 
-    def page(result: xr.Dataset, folder: Path) -> Any:
+    def page(result, folder):
         path = folder / "scene.json"
         path.write_text(json.dumps(motion_scene(shown(result))), encoding="utf-8")
         return json.loads(run("page.test.mjs", path))
 
     @pytest.mark.spread(0, "ends early")
-    def test_the_page_draws_it(motion: tuple[str, xr.Dataset], tmp_path: Path) -> None:
+    def test_the_page_draws_it(motion, tmp_path):
         name, result = motion
         told = page(result, tmp_path)["motion"]
         ends = "Larger load on an end of bearing or guide"
@@ -177,7 +173,7 @@ if NODE:
         assert told["clicked"] == [pytest.approx(one.time / end * (rows - 1), abs=1) for one in shown(result).events]
 
     @pytest.mark.slow
-    def test_it_is_played_in_real_time_and_stops_at_its_end(tmp_path: Path) -> None:
+    def test_it_is_played_in_real_time_and_stops_at_its_end(tmp_path):
         told = page(run_down(), tmp_path)["motion"]
         assert told["speed"] == "real time"
         assert told["played"]["half"] == pytest.approx(told["last"] / 2, abs=1)  # after half its time
@@ -186,16 +182,16 @@ if NODE:
         assert told["played"]["again"] == 0
 
 
-def _full(series: list[float], count: int) -> list[float]:
+def _full(series, count):
     return series * count if len(series) == 1 else series
 
 
 @functools.cache
-def rattled() -> xr.Dataset:
+def rattled():
     return trunnion.simulate(rattling(), duration=7e-4, steps=700)
 
 
-def test_the_path_of_the_pin_lies_in_its_hole() -> None:
+def test_the_path_of_the_pin_lies_in_its_hole():
     (axes,) = plot(rattled(), "orbit").axes
     (wall,), path = axes.patches, {len(line.get_xdata()): line for line in axes.lines}[701]
     assert wall.get_radius() == pytest.approx(500.0)  # µm
@@ -203,7 +199,7 @@ def test_the_path_of_the_pin_lies_in_its_hole() -> None:
     assert "45.8" in axes.get_title(loc="left")
 
 
-def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
+def test_each_end_of_a_pin_in_space_has_its_hole():
     result = trunnion.simulate(rattling_in_space(), duration=3e-4, steps=100)
     panels = plot(result, "orbit").axes
     assert [axes.get_title(loc="left").partition(":")[0] for axes in panels] == ["Q.end_1", "Q.end_2"]
@@ -216,7 +212,7 @@ def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
 
 
 @pytest.mark.slow
-def test_the_report_has_force_gap_and_orbit() -> None:
+def test_the_report_has_force_gap_and_orbit():
     page = Page(report(rattled()))
     assert not page.open
     (contact,) = page.scene()["motion"]["contacts"]
@@ -228,7 +224,7 @@ def test_the_report_has_force_gap_and_orbit() -> None:
     assert "holes" in pictures[0]
 
 
-def test_columns_of_contacts_and_impacts() -> None:
+def test_columns_of_contacts_and_impacts():
     times = {name: (unit, values) for name, unit, values in columns(rattled())}
     assert times["Q.contact_gap"][0] == "m"
     assert times["Q.contact_gap"][1][0] == pytest.approx(5e-4)
@@ -240,7 +236,7 @@ def test_columns_of_contacts_and_impacts() -> None:
     assert impacts["approach"][1][0] == pytest.approx(4.38578315, rel=1e-8)
 
 
-def test_the_spectrum_of_harmonics_is_theirs() -> None:
+def test_the_spectrum_of_harmonics_is_theirs():
     """Hann's window: a constant, and amplitudes on frequencies, each with half of it beside; Parseval's equation."""
     count, step = 400, 1e-3
     time = step * np.arange(count)
@@ -254,7 +250,7 @@ def test_the_spectrum_of_harmonics_is_theirs() -> None:
 
 
 @pytest.mark.parametrize("last", [700, 701])
-def test_the_spectrum_holds_the_square_of_the_force(last: int) -> None:
+def test_the_spectrum_holds_the_square_of_the_force(last):
     """Parseval: Σ (w F)²/(Σw)² N is the sum of the squares of the two-sided amplitudes, for even and odd numbers."""
     time, force = rattled()["time"].values[:last], rattled()["contact_normal_force"].values[:, :last]
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(last) / last)

@@ -1,6 +1,5 @@
 """Figures over the drive: every kind of result, its numbers, units, gaps, places, peaks, locking; written whole."""
 
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,7 +8,7 @@ from stand_in import four_bar, slider
 
 import trunnion
 from drawn import line
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
 from trunnion.views.axis import abscissa
@@ -56,7 +55,7 @@ def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(p
 
 
 def test_what_locks_at_every_position_is_drawn_as_it_is_without_friction():
-    mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-10mm.yaml")
+    mechanism = example("pezzuti-cardan-10mm")
     locked, ideal = trunnion.analyse(mechanism, 12), trunnion.analyse(mechanism.with_friction("off"), 12)
     panels = plot(locked, "reactions", ideal=ideal).axes
     labels = [[curve.get_label() for curve in axes.lines] for axes in panels]
@@ -100,11 +99,8 @@ def test_a_drive_turning_backwards_closes_too(plain):
     assert abscissa(back).period == pytest.approx(-360.0)
 
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
 def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
-    data = trunnion.read(EXAMPLES / "slider-crank.yaml").data()
+    data = example("slider-crank").data()
     of = {"stroke": "peak-to-peak", "far": "maximum", "near": "minimum"}
     data["measures"] = {name: {"slide": "S", "as": rule} for name, rule in of.items()} | {"swing": {"angle": "rod"}}
     result = trunnion.analyse(trunnion.Mechanism(**data), 36)
@@ -138,7 +134,7 @@ HOIST = {
 
 @pytest.fixture(scope="module")
 def press():
-    return trunnion.read(EXAMPLES / "drawing-press.yaml")
+    return example("drawing-press")
 
 
 def test_margin_and_multiples_are_drawn_as_computed(press):
@@ -174,5 +170,5 @@ def test_the_mechanism_is_drawn_at_a_place(press):
     place = cycle["drive"].values[12]
     drawn = plot(cycle, "mechanism", at=float(place) / 1000)  # a plain number is SI
     assert f"{place:.4g} mm" in drawn.axes[0].get_title(loc="left")
-    turning = trunnion.analyse(trunnion.read(EXAMPLES / "durango-fourbar.yaml"), 36)
+    turning = trunnion.analyse(example("durango-fourbar"), 36)
     assert "= 350°" in plot(turning, "mechanism", at="-10 deg").axes[0].get_title(loc="left")

@@ -73,7 +73,7 @@ def test_two_ends_are_told_apart_in_one_unit():
 FEET = {"m": "ft", "N": "lbf", "rad": "deg"}
 
 
-def test_units_by_hand() -> None:
+def test_units_by_hand():
     """1 lbf = 4.4482216152605 N, 1 ft = 0.3048 m."""
     with shown_as(FEET):
         assert parts(4.4482216152605, "N") == ("1", "lbf")
@@ -95,7 +95,7 @@ def test_units_by_hand() -> None:
         assert parts(0.02, "m") == ("20", "mm")
 
 
-def test_a_result_is_shown_as_its_model_is_stated() -> None:
+def test_a_result_is_shown_as_its_model_is_stated():
     crank = Mechanism(
         gravity=["0 ft/s^2", "-32.174 ft/s^2"],
         links={

@@ -5,7 +5,6 @@ import hashlib
 import json
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -13,7 +12,8 @@ from stand_in import NASTY, four_bar
 from stand_in_tolerances import CASES
 
 import trunnion
-from trunnion import play, read, sweep
+from mechanisms_parts import example
+from trunnion import play, sweep
 from trunnion.views.page import bundle
 from trunnion.views.play import tables as play_tables
 from trunnion.views.readings import readings
@@ -150,11 +150,10 @@ def test_every_kind_of_tolerance_makes_a_well_formed_page(name):
         ElementTree.fromstring(base64.b64decode(picture.removeprefix(SOURCE)))
 
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 JOINT = "joints.A.friction.coefficient"
 
 
-def _page(text: str) -> str:
+def _page(text):
     """A page that fetches nothing and runs nothing."""
     assert text.startswith("\n<!doctype html>") or text.startswith("<!doctype html>")
     assert "<script" not in text
@@ -163,8 +162,8 @@ def _page(text: str) -> str:
 
 
 @pytest.mark.slow
-def test_play() -> None:
-    result = play(read(EXAMPLES / "fourbar-with-play.yaml"), ["rotation:C", "rotation:D"], steps=12)
+def test_play():
+    result = play(example("fourbar-with-play"), ["rotation:C", "rotation:D"], steps=12)
     page = _page(trunnion.report(result))
     assert page.count("<img") == 2
     for table in play_tables(result):
@@ -173,8 +172,8 @@ def test_play() -> None:
 
 
 @pytest.mark.slow
-def test_sweep() -> None:
-    result = sweep(read(EXAMPLES / "toleranced-fourbar.yaml"), {JOINT: [0.0, 0.1, 0.2]}, steps=12)
+def test_sweep():
+    result = sweep(example("toleranced-fourbar"), {JOINT: [0.0, 0.1, 0.2]}, steps=12)
     page = _page(trunnion.report(result, measures=["efficiency", "friction_power_mean"]))
     assert page.count("<img") == 2
     for value in result["efficiency"].values:

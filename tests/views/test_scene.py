@@ -12,7 +12,7 @@ from stand_in import four_bar
 from test_report import Page
 
 from mechanisms import MODELS, analyse, slider_crank
-from mechanisms_parts import joined
+from mechanisms_parts import EXAMPLES, joined
 from trunnion import Mechanism, read
 from trunnion import analyse as analysed
 from trunnion.errors import Status
@@ -93,7 +93,6 @@ def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():
     np.testing.assert_allclose(shown["G"]["x"], result["reaction_force"].sel(joint="G", axis="x"), rtol=1e-6)
 
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NODE = shutil.which("node")
 
 if NODE:  # not a skip: what must hold everywhere is tested in Python; this is the browser's own part

@@ -1,7 +1,6 @@
 """Figures and tables of sweeps over any number of names: what runs along what, gaps, odd values, nothing cut off."""
 
 import csv
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -10,11 +9,11 @@ from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 import trunnion
 from drawn import texts
+from mechanisms_parts import example
 from trunnion import Status, save
 from trunnion.views.shown import plot as figure
 from trunnion.views.sweep import arrange, tables
 
-EXAMPLES = File(__file__).parents[2] / "examples"
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)
 FRICTION = scale([0.05, 0.1, 0.2])
@@ -33,15 +32,11 @@ def names(plan):
 @pytest.mark.parametrize(
     ("x", "family", "expected"),
     [
-        ("", "", ("a", "b", ["d"], ["c"])),
-        ("b", "", ("b", "a", ["d"], ["c"])),
-        ("", "d", ("a", "d", ["b"], ["c"])),
-        ("", "a", ("b", "a", ["d"], ["c"])),
-        ("d", "b", ("d", "b", ["a"], ["c"])),
-        ("c", "", ("c", "a", ["b", "d"], [])),
-        ("", "c", ("a", "c", ["b", "d"], [])),
+        ("", "", ("a", "b", ["d"], ["c"])), ("b", "", ("b", "a", ["d"], ["c"])), ("", "d", ("a", "d", ["b"], ["c"])),
+        ("", "a", ("b", "a", ["d"], ["c"])), ("d", "b", ("d", "b", ["a"], ["c"])),
+        ("c", "", ("c", "a", ["b", "d"], [])), ("", "c", ("a", "c", ["b", "d"], [])),
     ],
-)
+)  # fmt: skip
 def test_names_are_laid_out_in_their_order_or_as_told(x, family, expected):
     result = swept({"a": scale([1, 2]), "c": scale([7]), "b": scale([3, 4, 5]), "d": scale([6, 8])})
     assert names(arrange(result, x, family)) == expected
@@ -124,7 +119,7 @@ def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, sho
 def test_a_point_that_locks_leaves_the_others_their_numbers():
     """Its effort and reactions have no bound, beside which all others would be rounding."""
     name, head = "joint_defaults.friction.coefficient", "A.effort max [N m]"
-    mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    mechanism = example("toleranced-fourbar")
     (table,) = tables(trunnion.sweep(mechanism, {name: [1.0, 4.0]}, steps=12))
     alone = np.max(trunnion.analyse(mechanism.with_values({name: 1.0}), steps=3600)["drive_effort"].values)
     first, second = (row[table.head.index(head)] for row in table.rows)

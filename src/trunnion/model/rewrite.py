@@ -22,6 +22,8 @@ from trunnion.model.mechanism import Mechanism, read_mechanism
 __all__ = ["changed_text", "renamed", "rewrite_mechanism"]
 
 YAMLS = {".yaml", ".yml"}
+# of a way of writing that was not foreseen: the model is written anew, without its comments
+UNFORESEEN = (MechanismError, YAMLError, OSError, ValueError, TypeError, LookupError)
 Edit = tuple[int, int, str]  # from where to where a text is replaced, and by what
 
 
@@ -35,14 +37,17 @@ def rewrite_mechanism(
     source, path = Path(source), Path(path)
     if not over and path.exists() and path.samefile(source):
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
-    text = _edited_source(mechanism, source, path) if {source.suffix.lower(), path.suffix.lower()} <= YAMLS else None
+    text = ""
+    if {source.suffix.lower(), path.suffix.lower()} <= YAMLS:
+        with suppress(*UNFORESEEN):
+            text = _edited_source(mechanism, source, path)
     with whole(path) as temporary:
-        if text is not None:
+        if text:
             temporary.write_text(text, encoding="utf-8", newline="\n")
             with suppress(MechanismError):
                 if read_mechanism(temporary) == mechanism:
                     return
-        mechanism.write(temporary)  # a way of writing that was not foreseen
+        mechanism.write(temporary)
 
 
 def changed_text(text: str, after: Mapping[str, Any]) -> str:
@@ -51,22 +56,19 @@ def changed_text(text: str, after: Mapping[str, Any]) -> str:
     MechanismError if the text cannot be read.
     """
     before = entries_of(text)[0]
-    edited = _edited(text, before, after)
-    try:
-        return edited if edited is not None and entries_of(edited)[0] == after else text_of(after)
-    except MechanismError:  # a way of writing that was not foreseen
-        return text_of(after)
+    with suppress(*UNFORESEEN):
+        edited = _edited(text, before, after)
+        if entries_of(edited)[0] == after:
+            return edited
+    return text_of(after)
 
 
-def _edited_source(mechanism: Mechanism, source: Path, path: Path) -> str | None:
-    """The text of the source with what is different in the mechanism; None if it cannot be had.
+def _edited_source(mechanism: Mechanism, source: Path, path: Path) -> str:
+    """The text of the source with what is different in the mechanism.
 
     The source goes on to name its files of points, if these are the same and `path` is in its folder.
     """
-    try:
-        text, before, entries = source.read_text("utf-8"), read_mechanism(source).data(), read_entries(source)[0]
-    except (MechanismError, OSError, ValueError):
-        return None
+    text, before, entries = source.read_text("utf-8"), read_mechanism(source).data(), read_entries(source)[0]
     after, same_folder = mechanism.data(), source.resolve().parent == path.resolve().parent
     for section, name, _ in stated_files(entries):
         entry = before[section][name]
@@ -79,13 +81,9 @@ def _edited_source(mechanism: Mechanism, source: Path, path: Path) -> str | None
 # ---- where the text changes -----------------------------------------------------------------------------------
 
 
-def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
-    """The text with what differs put in where it stands; None where it is written in a way that was not foreseen."""
-    try:
-        edits = sorted(_edits(text, composed(text), before, after))
-    except (MechanismError, YAMLError, ValueError, TypeError, LookupError):
-        return None
-    for start, end, new in reversed(edits):
+def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """The text with what differs put in where it stands."""
+    for start, end, new in sorted(_edits(text, composed(text), before, after), reverse=True):
         rest = text[end:]
         blanks = len(rest) - len(rest.lstrip(" "))
         if end > start and rest[blanks : blanks + 1] == "#":  # the comment behind it stays in its column

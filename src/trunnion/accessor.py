@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from trunnion.views.report import Animation
 
-__all__ = ["Accessor"]
-
 
 @xr.register_dataset_accessor("trunnion")  # type: ignore[no-untyped-call]
 @strict_arguments

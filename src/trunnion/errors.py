@@ -12,8 +12,6 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
 from typing import Any, Self
 
-__all__ = ["Coded", "Finding", "MechanismError", "Severity", "Status", "agreeing", "counted"]
-
 
 def counted(count: int, noun: str, plural: str = "") -> str:
     """A number with its noun: "1 row", "2,000 rows"."""

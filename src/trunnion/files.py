@@ -23,8 +23,6 @@ from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["Target", "cache_directory", "folder", "guard", "reading", "same", "whole", "writing"]
-
 REMEDY = "name another file"
 MOST_LINKS = 40  # one to the other, as operating systems have it
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin)|(stdout)|(stderr)|fd/(\d+))|/proc/(?:self|\d+)/fd/(\d+)")

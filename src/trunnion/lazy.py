@@ -8,8 +8,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
     from typing import Any
 
-__all__ = ["loader"]
-
 
 def loader(package: str, places: Mapping[str, tuple[str, str]], results: Collection[str] = ()) -> Callable[[str], Any]:
     """The `__getattr__` of a package.

@@ -32,11 +32,6 @@ from trunnion.algebra.space import Frame
 from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, minus, scaled
 from trunnion.joints.contact_loads import length_of
 
-__all__ = [
-    "CLEARANCE_MODELS", "ClearanceModel", "described", "describing", "ellipse_error", "leaning", "pin_transform",
-    "pressed", "turned_by_friction", "worst_case",
-]  # fmt: skip
-
 Vector = tuple[Number, ...]  # of as many components as its end has
 Offsets = Sequence[Vector]  # one vector for each end
 

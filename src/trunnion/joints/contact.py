@@ -21,11 +21,6 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = [
-    "CONTACT_LAWS", "ContactLaw", "elastic_force", "hertz_stiffness", "loss_factor", "normal_force",
-    "restitution_of",
-]  # fmt: skip
-
 HALVINGS = 200
 SMALL, TERMS = 0.05, 20  # χ of which the series is summed, and its terms
 

@@ -28,8 +28,6 @@ from trunnion.algebra.namespace import Number, each, namespace
 from trunnion.algebra.space import Frame
 from trunnion.algebra.vector import Vector3, cross, dot, minus
 
-__all__ = ["BearingLoad", "ContactLoad", "GuideLoad", "PinLoad", "Reaction"]
-
 Reaction = tuple[Number, ...]
 
 

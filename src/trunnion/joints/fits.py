@@ -15,8 +15,6 @@ from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["GRADES", "HOLES", "SHAFTS", "FitLimits", "fit", "limits", "standard_tolerance"]
-
 # Ranges of nominal size, mm: each begins above the entry before and includes its own. The steps between are for
 # letters whose deviation changes faster with the size.
 SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)

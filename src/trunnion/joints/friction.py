@@ -14,11 +14,6 @@ from typing import Protocol
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = [
-    "FRICTION_LAWS", "FrictionLaw", "LawParameter", "coulomb", "dahl", "directed", "lugre", "rolling", "stribeck",
-    "viscous",
-]  # fmt: skip
-
 GONE = -700.0  # of which e^x leaves nothing of a coefficient, and which machine code still takes
 
 

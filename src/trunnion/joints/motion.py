@@ -19,8 +19,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.spline import Spline, spline
 
-__all__ = ["MOTION_LAWS", "Drive", "MotionLaw", "Span", "constant", "cycloidal", "harmonic", "table"]
-
 # What a driver states, by key: `speed`, `range.from`, `points.0.time` …, SI; `returns` and `periodic` are bool.
 Parameters = Mapping[str, Number]
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.spline import look_up
 
-__all__ = ["MOTORS", "MotorKind", "constant", "linear", "table", "transmitted"]
-
 Array = NDArray[np.float64]
 Parameters = Mapping[str, Array]  # what a motor states, by key, SI; of `points` lists, of `over` a word
 

@@ -18,8 +18,6 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import NULL, Frame, Screw, line_of, slid, turned
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 
-__all__ = ["GUIDED", "MOTIONS", "PAIRS", "Pair", "PairMotion"]
-
 
 @dataclass(frozen=True)
 class Pair:

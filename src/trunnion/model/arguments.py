@@ -17,8 +17,6 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
 from trunnion.model.units import shown_as, stated_by
 
-__all__ = ["check_keywords", "held", "strict_arguments"]
-
 Public = TypeVar("Public", bound=Callable[..., Any])
 
 # options of the command line that are methods of a mechanism in Python

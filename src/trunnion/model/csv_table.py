@@ -29,11 +29,6 @@ from trunnion.model.expression import literal
 from trunnion.model.names import nearest, unguarded
 from trunnion.model.units import ANY, KINDS, NUMBER, Kind, UnitError, dimension_text, unit
 
-__all__ = [
-    "MOST_FILES", "NOTHING", "TIME", "TableFiles", "bare", "cells_of", "column", "heading", "number", "numbered",
-    "place_findings", "read_text", "separator_of", "stated_files", "units_below", "with_points",
-]  # fmt: skip
-
 TableFiles = Mapping[str, str | os.PathLike[str]]  # file by name of a driver or table
 
 MAX_BYTES = 1_000_000  # of a file, and of all that a model names

@@ -26,12 +26,6 @@ from trunnion.model.names import FORMULA, nearest
 from trunnion.model.quantity import Dimensionless, Length
 from trunnion.model.rules import Directed
 
-__all__ = [
-    "FORMS", "Direction", "Name", "OneOf", "Part", "Position", "ReadOnlyDict", "ShortForm", "forms", "problem",
-    "shape",
-]  # fmt: skip
-
-
 K = TypeVar("K")
 V = TypeVar("V")
 

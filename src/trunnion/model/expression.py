@@ -23,8 +23,6 @@ import numpy as np
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, normalise, unit
 
-__all__ = ["MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse", "unitless_angles"]
-
 MAX_LENGTH = 500
 MAX_DEPTH = 40
 

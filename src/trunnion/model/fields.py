@@ -19,11 +19,6 @@ from trunnion.model.rules import InSpace, Refers
 from trunnion.model.tolerance_parts import Correlation, Cost, Process, Variation, VariationDefaults
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
-__all__ = [
-    "FIXED_NAMES", "Fields", "course_kind", "dimension_kinds", "drive_kind", "operand_dimensions", "operands",
-    "place_kind",
-]  # fmt: skip
-
 FIXED_NAMES = ("ground", "frame")
 
 

@@ -26,11 +26,6 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.csv_table import TableFiles, place_findings, read_text, with_points
 
-__all__ = [
-    "Lines", "composed", "entries_of", "place", "placed", "read_entries", "read_model", "text_of",
-    "version_findings", "write_model",
-]  # fmt: skip
-
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
 _TYPES = {".yaml": "YAML", ".yml": "YAML", ".json": "JSON", ".toml": "TOML"}

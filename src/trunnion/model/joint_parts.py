@@ -35,12 +35,6 @@ from trunnion.model.quantity import (
 from trunnion.model.rules import NotNegative, NotWith, NotZero, OnlyWith, Positive, Refers, Selects, Within
 from trunnion.model.units import KINDS, UnitError
 
-__all__ = [
-    "DEFAULT_LAW", "PLAY_PAIRS", "TURNING_PAIRS", "Contact", "FitChoice", "Friction", "Guide", "Joint",
-    "JointDefaults", "LoopJoint", "Losses", "Misalignment", "Pin", "Seat", "clearance", "contact_lacks", "has_play",
-    "merge_joint", "play", "stated",
-]  # fmt: skip
-
 FRICTION_MODELS = ("two-contact", "pezzuti")
 
 

@@ -17,8 +17,6 @@ from trunnion.model.rules import InSpace, NotWith, Positive
 from trunnion.model.tolerance_parts import LimitText
 from trunnion.model.units import KINDS, Kind, UnitError
 
-__all__ = ["MEASURES", "STATISTICS", "Measure", "MeasureKind"]
-
 
 @dataclass(frozen=True)
 class MeasureKind:

@@ -33,8 +33,6 @@ from trunnion.model.units import Kind
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Mechanism", "place_of", "read_mechanism"]
-
 
 @strict_arguments
 class Mechanism(Varying):

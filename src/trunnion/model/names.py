@@ -10,8 +10,6 @@ from functools import cached_property
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["ERRORS", "FORMULA", "ParameterNames", "as_key", "guarded", "is_number", "nearest", "unguarded"]
-
 SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
 _PLAIN = re.compile(r"[^\W\d](?:[\w. +/-]*\w)?")  # what YAML takes for a text as it stands, in braces too

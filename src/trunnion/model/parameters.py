@@ -30,8 +30,6 @@ from trunnion.model.rules import Within, markers
 from trunnion.model.tolerance_parts import Limits, Variation
 from trunnion.model.units import ANY, KINDS, Kind, unit
 
-__all__ = ["LIMITS", "Entry", "Numbers", "ParameterSet", "dimension_errors", "measured", "walk"]
-
 Location = tuple[str | int, ...]
 Rules = tuple[Any, ...]  # of model.rules
 LIMITS = ("lower", "upper")

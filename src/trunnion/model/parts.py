@@ -48,11 +48,6 @@ from trunnion.model.rules import (
 )
 from trunnion.model.units import KINDS
 
-__all__ = [
-    "AT", "FOLDS", "USUAL_PRESSURE_ANGLE", "Driver", "Gear", "Hint", "InertiaTensor", "Initial", "Link", "Load",
-    "Motor", "Point", "PolarPoint", "Spring", "Table",
-]  # fmt: skip
-
 
 class Point(ShortForm):
     """A point of a link in the link's frame: `[x, y]`, or with the axis of a sliding or spatial joint there."""

@@ -18,8 +18,6 @@ from trunnion.model.names import nearest
 from trunnion.model.parameters import Location, item_name
 from trunnion.model.quantity import AnyQuantity, Quantity
 
-__all__ = ["assign", "fields_at", "schema_findings", "stated_at", "with_law"]
-
 
 def assign(
     data: dict[str, Any], location: Location, value: float | str | Quantity | list[str], coordinates: int

@@ -22,12 +22,6 @@ from trunnion.algebra.namespace import Number
 from trunnion.model.expression import LITERAL, Expression, literal, parse
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, dimension_text, fits, normalise
 
-__all__ = [
-    "Acceleration", "Angle", "AngleOrLength", "AnyQuantity", "Damping", "Dimensionless", "Force", "ForceOrMoment",
-    "Inertia", "Length", "LineStiffness", "Mass", "MassOrInertia", "Moment", "Pressure", "Quantity", "Rate",
-    "Stiffness", "Time", "TorsionalStiffness", "evaluation_order", "nominal_dimensions", "signed_terms",
-]  # fmt: skip
-
 _SYMMETRIC = re.compile(r"^(.*?)\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
 _LIMITS = re.compile(r"^(.*\S)\s+([-+][0-9.][^/]*|0)/\s*([-+][0-9.].*|0)$", re.DOTALL)
 

@@ -19,8 +19,6 @@ from trunnion.model.csv_table import OF_A_FILE, stated_files
 from trunnion.model.file import composed, entries_of, read_entries, text_of
 from trunnion.model.mechanism import Mechanism, read_mechanism
 
-__all__ = ["changed_text", "renamed", "rewrite_mechanism"]
-
 YAMLS = {".yaml", ".yml"}
 # of a way of writing that was not foreseen: the model is written anew, without its comments
 UNFORESEEN = (MechanismError, YAMLError, OSError, ValueError, TypeError, LookupError)

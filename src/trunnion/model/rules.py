@@ -20,11 +20,6 @@ from trunnion.errors import Finding
 from trunnion.model.names import nearest
 from trunnion.model.units import KINDS, Kind
 
-__all__ = [
-    "Directed", "InSpace", "NotNegative", "NotWith", "NotZero", "OnlyWith", "Positive", "Refers", "Rising",
-    "Selects", "Within", "faults", "group_findings", "key_findings", "limit_findings", "markers", "stray",
-]  # fmt: skip
-
 ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than it
 Values = Mapping[str, Number]
 Model = Any  # a `Fields`, which stands above: it has `coordinates`, how many a point has, and `named`

@@ -14,8 +14,6 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from trunnion.model.mechanism import Mechanism
 
-__all__ = ["SCHEMA_FILE", "SchemaGenerator", "json_schema", "schema_text"]
-
 SCHEMA_FILE = Path(__file__).with_name("mechanism.schema.json")
 
 

@@ -22,11 +22,6 @@ from trunnion.model.quantity import AnyQuantity, Dimensionless, Quantity, signed
 from trunnion.model.rules import NotNegative, NotWith, Positive, Refers, Selects, Within
 from trunnion.model.units import Kind, UnitError, normalise
 
-__all__ = [
-    "COST_MODELS", "DIGITS", "DISTRIBUTIONS", "OPTIONS", "Correlation", "Cost", "CostOption", "LimitText", "Limits",
-    "Process", "Variation", "VariationDefaults", "half_width", "limits_text", "written",
-]  # fmt: skip
-
 _EITHER = re.compile(r"^\s*(?:±|\+/-|\+-)\s*(.*)$", re.DOTALL)
 _BOTH = re.compile(r"^([-+][0-9.][^/]*|0)/\s*([-+][0-9.].*|0.*)$", re.DOTALL)
 _FORMS = "write ±0.05 mm or +0.02/-0.01 mm"

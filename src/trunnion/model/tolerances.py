@@ -26,8 +26,6 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import DIGITS, DISTRIBUTIONS, Cost, Variation, half_width, limits_text, written
 from trunnion.model.units import ANY, KINDS, UnitError, unit
 
-__all__ = ["Price", "ProcessChoice", "Tolerance", "Varying", "ends_motion", "may_vary", "towards"]
-
 DEFAULTS = "joint_defaults."
 FULL_TURN = "direction"  # the distribution over all directions
 FORMULA = ("A", "B", "k")

@@ -25,12 +25,6 @@ from typing import Any, Final, Literal
 
 from trunnion.model.names import nearest
 
-__all__ = [
-    "ANGLE", "ANY", "KINDS", "NUMBER", "Dimension", "Kind", "TableUnits", "UnitError", "dimension_text", "fits",
-    "follow", "in_use", "normalise", "pound_feet", "root", "shown_as", "si_unit", "stated_by", "stated_units",
-    "unit",
-]  # fmt: skip
-
 Dimension = tuple[Fraction, Fraction, Fraction, Fraction]
 TableUnits = Literal["si", "model"]  # that tables are written in
 

@@ -22,11 +22,6 @@ if TYPE_CHECKING:
 if TYPE_CHECKING:
     pass
 
-__all__ = [
-    "KEPT", "MORE_THAN", "NUMERICAL", "Figure", "attribute", "cited", "codes", "encoded", "finding_rows",
-    "findings_of", "origin", "plain", "summary_of", "units_of", "whole",
-]  # fmt: skip
-
 _AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
 KEPT = "variables"  # the attribute of a result that has not kept every variable
 # names of figures that say how well a result is solved, and nothing of the mechanism

@@ -22,12 +22,6 @@ from trunnion.results.attributes import Described, Figure, encoded
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "EVERYWHERE", "ROUNDING", "UNITS_OF_EACH", "Column", "MemberUnits", "Result", "Scales", "Variable",
-    "dataset_of", "described", "driven", "extreme_place", "flat", "powers_of", "scales_in", "unit_of",
-    "units_along", "with_variables", "without_noise",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Variable:

@@ -10,11 +10,6 @@ from collections.abc import Iterable
 
 from trunnion.model.units import in_use
 
-__all__ = [
-    "Units", "between", "common", "decimals", "decimals_of", "drawn_in", "joined", "number", "parts", "prefixed",
-    "quantity", "read_in", "readable", "scale_of", "scaled", "signed", "with_uncertainty",
-]  # fmt: skip
-
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 SCALABLE = ("N m", "N", "W", "m", "s", "J", "Pa")
 SMALL = 1e-5  # m: lengths below are told in µm

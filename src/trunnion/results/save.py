@@ -34,8 +34,6 @@ from trunnion.results.tables import columns as flat_columns
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["FORMATS", "check_format", "frame", "save"]
-
 Columns = Callable[[xr.Dataset, str], list[Column]]  # of a table by name; of the file's own if that is empty
 BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measurement")  # no column has one unit there
 

@@ -19,8 +19,6 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LOCKING", "OF_SOME_JOINTS", "SAME_AS", "VARIABLES", "along_positions", "dataset", "variables"]
-
 
 def _coordinate(
     name: str, dim: str, unit: str, long_name: str, column: str, space: str = "", usual: int = 3

@@ -24,8 +24,6 @@ from trunnion.model.rules import InSpace, Refers, faults, group_findings, key_fi
 from trunnion.model.tolerances import Varying, ends_motion
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, UnitError, unit
 
-__all__ = ["bare_number", "check_model", "check_values", "in_radians"]
-
 Values = Mapping[str, Number]
 # of the largest moment, by which a flat body may violate the triangle inequality: of four digits, of three or two
 INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2

@@ -34,8 +34,6 @@ from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.quantity import nominal_dimensions
 from trunnion.model.rules import faults
 
-__all__ = ["joint_findings", "joint_values"]
-
 MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
 LARGE = 0.01  # of a side: a play above it is not small
 

@@ -19,11 +19,6 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.rules import faults
 from trunnion.model.units import ANY, KINDS, Dimension, UnitError, dimension_text, fits
 
-__all__ = [
-    "driver_findings", "driver_values", "expression_name", "gear_values", "gears", "load_findings", "loop",
-    "motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name",
-]  # fmt: skip
-
 Values = Mapping[str, Number]
 ON_ONE_AXIS = tuple(kind for kind, pair in PAIRS.items() if pair.one_axis)  # whose motion is a dual angle about it
 

@@ -21,8 +21,6 @@ from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Cost, Variati
 from trunnion.model.tolerances import DEFAULTS, FULL_TURN, Price, Tolerance, Varying, ends_motion, may_vary, towards
 from trunnion.model.units import KINDS, Kind, UnitError, dimension_text, unit
 
-__all__ = ["check_measure", "cost_values", "meant", "measure_values", "tolerance_names", "tolerance_values"]
-
 NUMBER = KINDS["number"].dimensions[0]
 ROUNDING = 1e-9  # of an eigenvalue, and of limits that touch zero
 

@@ -18,8 +18,6 @@ from trunnion.results.tables import cycle, studies
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["KINDS", "check_table", "columns", "in_model_units", "kind_of", "selected", "table_of"]
-
 TABULAR = (".csv", ".parquet", ".xlsx")  # files whose name says which table; the others hold the whole result
 
 OF_CONTACTS = ("impacts", "spectrum")  # tables of a motion in which a joint is in play

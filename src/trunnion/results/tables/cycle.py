@@ -21,11 +21,6 @@ from trunnion.results.variables import LOCKING, VARIABLES, variables
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "events", "impacts", "locking", "motion", "positions", "rest", "spectrum", "status_column", "time_column",
-    "times",
-]  # fmt: skip
-
 Stems = Mapping[str, str]  # by variable: what stands behind the name of the member
 Has = Callable[[int, str, tuple[int, ...]], bool]  # whether a member has a variable at an index along the others
 

@@ -26,8 +26,6 @@ from trunnion.results.tables.cycle import status_column, time_column
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["COMPARISON", "IDENTIFICATION", "TOLERANCE", "courses", "fitted", "played", "points", "swept"]
-
 COURSES = ("measured", "scatter", "uncertainty", "expanded", "model", "residual", "compared")
 FIGURES = ("start", "estimate", "standard_uncertainty", "lower", "upper")
 FITS = ("rms_before", "rms_after", "rms_expected", "held_out_before", "held_out_after", "held_out_expected")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import random
 import re
 import struct
@@ -30,6 +31,7 @@ from exchange.test_robots import MJCF, OLD_SDF, SDF, URDF
 from trunnion.errors import MechanismError
 from trunnion.exchange import import_file, model_text
 
+logging.getLogger("ezdxf").disabled = True  # it quotes damaged text, which xdist cannot send
 BOXED, ITEM = solid(1, BOX * CORNERS, FACES), '<item objectid="1"/>'
 
 
@@ -63,7 +65,7 @@ def refusal(path: Path) -> str:
     try:
         model_text(import_file(path))
     except MechanismError as error:
-        return str(error)
+        return str(error).encode().decode()  # any terminal takes it
     return ""
 
 
@@ -246,14 +248,14 @@ HOSTILE: dict[str, dict[str, bytes | str | Callable[[Path], object]]] = {
     ".json": {"deep": "[" * 100_000, "a list": "[]", "a number": '{"joints": 3}', "no joints": '{"joints": []}'},
     ".pmks": {"long": "https://app.pmksplus.com/?" + "x" * 2_000_000},
 }
-for suffix, root in ((".mjcf", "mujoco"), (".sdf", "sdf"), (".urdf", "robot")):
+for suffix, root, inner in ((".mjcf", "mujoco", "default"), (".sdf", "sdf", "model"), (".urdf", "robot", "link")):
     HOSTILE[suffix] = {
         "entities": f"{BOMB}<{root}>&b;</{root}>",
         "external": f'{OUTSIDE[:-1]} [<!ENTITY a SYSTEM "file:///etc/passwd">]><{root}>&a;</{root}>',
         "elements": f"<{root}>{'<link/>' * 10**6}</{root}>",
         "large": f"<{root}>{'<link />' * 2 * 10**6}</{root}>",
         "a long text": f'<{root} name="{"1 " * 4 * 10**6}"/>',
-        "deep": "<a>" * 10**5,
+        "deep": f"<{root}>{f'<{inner}>' * 90_000}{f'</{inner}>' * 90_000}</{root}>",
         "open": f"<{root}><link name='a'>",
         "another root": "<html/>",
         "encoding": f'<?xml version="1.0" encoding="klingon"?><{root}/>',

@@ -285,14 +285,18 @@ def shape(draw: np.random.Generator) -> str:
 
 
 @settings(deadline=None, max_examples=25)
-@given(seed=st.integers(0, 2**31 - 1), order=st.sampled_from(["xyz", "zyx", "XYZ", "zxz", "ZYx"]))
+@given(
+    seed=st.integers(0, 2**31 - 1),
+    order=st.sampled_from(["xyz", "zyx", "XYZ", "zxz", "ZYx"]),
+    source=st.sampled_from(["auto", "true"]),
+)
 def test_any_frame_and_shape_is_where_mujoco_has_it(
-    seed: int, order: str, tmp_path_factory: pytest.TempPathFactory
+    seed: int, order: str, source: str, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     mujoco = pytest.importorskip("mujoco")
     draw = np.random.default_rng(seed)
     axes = [row(draw.normal(size=3)) for _ in range(4)]
-    text = f"""<mujoco><compiler eulerseq="{order}"/>
+    text = f"""<mujoco><compiler eulerseq="{order}" inertiafromgeom="{source}"/>
 <default><geom density="500"/><default class="light"><geom density="20"/></default></default>
 <worldbody><body name="a" {placed(draw)}>
   <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(draw)}{shape(draw)}

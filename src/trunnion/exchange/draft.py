@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
 __all__ = ["MATERIALS", "Array", "Body", "Draft", "ImportOptions", "Pair", "Place", "Positions", "components", "few",
-           "free_name", "moved", "perpendicular", "positions_of", "refused", "steiner", "united"]  # fmt: skip
+           "free_name", "moved", "perpendicular", "positions_of", "printable", "refused", "steiner",
+           "united"]  # fmt: skip
 
 Array = NDArray[np.float64]
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
@@ -346,6 +347,11 @@ def perpendicular(axis: Array) -> Array:
     base = np.eye(3)[int(np.argmin(abs(unit)))]
     across = base - (base @ unit) * unit
     return np.asarray(across / np.linalg.norm(across), dtype=float)
+
+
+def printable(text: str) -> str:
+    """Text on one line that any terminal and file takes."""
+    return "".join(sign if sign.isprintable() else " " for sign in text)[:300]
 
 
 def free_name(text: str, used: Iterable[str], default: str = "part") -> str:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ezdxf import recover
 
-from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
+from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, printable, refused
 from trunnion.exchange.drawing import AUXILIARY
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     document, auditor = recover.readfile(path)
     if auditor.has_errors or auditor.has_fixes:
         mended = "; ".join(entry.message for entry in [*auditor.errors, *auditor.fixes][:3])
-        what = f"is damaged; what could be mended is read: {mended}"
+        what = printable(f"is damaged; what could be mended is read: {mended}")
         draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
     sketch = Sketch(document, UNITS.get(document.header.get("$INSUNITS", 0)) or draft.assumed_unit(options))
     marks = (*sketch.circles, *sketch.lines, *sketch.halves, *sketch.texts)

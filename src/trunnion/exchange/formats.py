@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, few, positions_of, refused
+from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, few, positions_of, printable, refused
 from trunnion.exchange.model_file import complete
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest
@@ -164,7 +164,7 @@ def import_file(
     except (RecursionError, MemoryError):
         raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
     except Exception as error:  # a library raises anything at a damaged file
-        what = f"is damaged, or not as its format has it: {type(error).__name__} {error}"[:200]
+        what = printable(f"is damaged, or not as its format has it: {type(error).__name__} {error}")
         raise MechanismError(Finding(what, remedy="mend the file, or export it again", file=str(path))) from None
     draft.source = draft.source or path.name
     draft.name = draft.name or path.stem

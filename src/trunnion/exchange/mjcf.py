@@ -161,7 +161,6 @@ class _Reader(Scene):
             else:
                 matrix = np.diag(numbers(inertial.get("diaginertia"), f"diaginertia of {where}", 3, (0, 0, 0)))
             body.inertia = placed.inertia(matrix)
-        if inertial is not None or self.compiler.get("inertiafromgeom") == "false":
             self.weighed.add(name)
         self.contents(element, name, frame, style)
 
@@ -230,6 +229,7 @@ class _Reader(Scene):
         mass_stated = number(values["mass"], f"mass {of}") if "mass" in values else None
         density = number(values.get("density"), f"density {of}", 1000)
         weightless = mass_stated == 0 or (mass_stated is None and density == 0)
+        weightless |= self.compiler.get("inertiafromgeom") == "false"
         if name in self.weighed or kind in ("plane", "hfield") or weightless:
             return
         count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)

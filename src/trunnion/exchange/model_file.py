@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import Array, Body, Draft, Pair, moved
+from trunnion.exchange.draft import Array, Body, Draft, Pair, moved, printable
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import nearest
 
@@ -132,7 +132,7 @@ class _Writer:
     def lines(self) -> Iterator[str]:
         draft = self.draft
         if draft.source:
-            yield f"# Made of {_comment(draft.source)}. Comments say how each number was found."
+            yield f"# Made of {printable(draft.source)}. Comments say how each number was found."
         yield "trunnion: 1"
         yield f"name: {_quoted(draft.name or 'Imported mechanism')}"
         yield f"space: {'spatial' if self.spatial else 'planar'}"
@@ -170,7 +170,7 @@ class _Writer:
                 second = pair.type == "universal" and pair.second_axis is not None and body.name == pair.links[1]
                 axis: Any = pair.second_axis if second else pair.axis
                 joints[pair.name] = f"{{at: {self.place(pair.at)}, axis: {self.plain(axis / np.linalg.norm(axis))}}}"
-        yield from (f"  # {_comment(comment)}" for comment in body.comments)
+        yield from (f"  # {printable(comment)}" for comment in body.comments)
         yield f"  {_quoted(body.name)}:"
         yield "    points:" if joints or points else "    points: {}"
         yield from (f"      {_quoted(name)}: {text}" for name, text in (*joints.items(), *points.items()))
@@ -187,7 +187,7 @@ class _Writer:
                 yield f"    inertia: {{{', '.join(f'{key}: {_number(part)}' for key, part in parts.items())}}}"
 
     def joint(self, pair: Pair) -> Iterator[str]:
-        yield from (f"  # {_comment(comment)}" for comment in pair.comments)
+        yield from (f"  # {printable(comment)}" for comment in pair.comments)
         turns = PAIRS[pair.type].turns
         if pair.limits is not None:
             factor, unit = (180 / math.pi, "deg") if turns else (1e3, "mm")
@@ -223,8 +223,3 @@ def _quoted(name: str) -> str:
         return name
     escaped = name.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
-
-
-def _comment(text: str) -> str:
-    """Text that stays a comment: on one line, printable."""
-    return "".join(sign if sign.isprintable() else " " for sign in text)[:300]

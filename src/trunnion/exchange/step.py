@@ -13,19 +13,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.brep import Face, Part21, Solid, mass_of, moments_of, moved, quoted
-from trunnion.exchange.draft import MATERIALS, Array, Body, Draft, ImportOptions, Place, free_name, refused
+from trunnion.exchange.draft import (
+    MATERIALS,
+    Array,
+    Body,
+    Draft,
+    ImportOptions,
+    Place,
+    Positions,
+    free_name,
+    printable,
+    refused,
+)
 from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.step_assembly import Assembly, Occurrence
-
-if TYPE_CHECKING:
-    from trunnion.exchange.draft import Positions
 
 __all__ = ["read", "write", "write_moved"]
 
@@ -62,7 +70,7 @@ def _opened(path: Path, options: ImportOptions) -> tuple[Draft, Assembly, dict[s
     except MechanismError:
         raise
     except BROKEN as error:
-        raise refused(f"is not as ISO 10303-21 has it: {type(error).__name__} {error}"[:200]) from None
+        raise refused(printable(f"is not as ISO 10303-21 has it: {type(error).__name__} {error}")) from None
 
 
 def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:

@@ -189,7 +189,6 @@ def loss_rows(result: xr.Dataset) -> list[Row]:
 # ---- for the browser ------------------------------------------------------------------------------------------------
 
 FAR, LEANT = 0.06, 0.2  # what is offered: the largest error of place as this share of the size, or of angle, rad
-MOST = 1000.0
 SLIGHT = 1e-3  # a stretch of less than this share of the largest error of place is not told
 
 
@@ -205,7 +204,7 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
     size = bodies.size if bodies else float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
     # the magnification at which errors are well seen and links are still where one looks for them: 1, 2 or 5 times 10ⁿ
     far, turned = peak(*point_errors(result).values()), peak(result["link_error"].values)
-    most = min(FAR * size / far if far else np.inf, LEANT / turned if turned else np.inf, MOST)
+    most = min(FAR * size / far if far else np.inf, LEANT / turned if turned else np.inf, 1000.0)
     steps = [step * base for base in (1.0, 10.0, 100.0, 1000.0) for step in (1.0, 2.0, 5.0)]
     return {
         "preset": max([step for step in steps if step <= most * (1 + 1e-9)], default=1.0),

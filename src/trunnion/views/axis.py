@@ -173,16 +173,12 @@ def series(values: Array | None) -> list[float | None]:
 
 
 class Interval(NamedTuple):
-    """A run of positions start ≤ i < stop with one status."""
+    """A run of positions start ≤ i < stop with one status, and that in a sentence."""
 
     start: int
     stop: int
     status: int
-
-    @property
-    def text(self) -> str:
-        """The status in a sentence."""
-        return status_text(self.status)
+    text: str
 
 
 def status_text(code: int) -> str:
@@ -196,5 +192,5 @@ def intervals(result: xr.Dataset, lowest: int = Status.NOT_CONVERGED) -> list[In
     if status is None or not status.size:
         return []
     edges = [0, *(np.flatnonzero(np.diff(status)) + 1).tolist(), status.size]
-    runs = (Interval(start, stop, int(status[start])) for start, stop in pairwise(edges))
-    return [run for run in runs if run.status >= lowest]
+    return [Interval(start, stop, int(status[start]), status_text(int(status[start])))
+            for start, stop in pairwise(edges) if status[start] >= lowest]  # fmt: skip

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = NDArray[np.float64]
-FORMAT = 1
-SUMS = ("useful_power", "efficiency_instant")
-DRIVEN = ("efficiency_instant",)  # of a steady cycle it says nothing: the flywheel does the work at each position
 STILL = 1e-9  # of the largest speed: a joint that is slower rests
 UNTURNED = 1e-6  # a link that turns slower than this share of its fastest has no screw axis worth a line
 
@@ -57,7 +54,7 @@ def scene(
     before = sorted({int(np.searchsorted(picked, index, side="right")) - 1 for index in lost})
     pulls, efficiency = members(rows, "spring_force", "spring"), column(result, "efficiency")
     drawn = {
-        "format": FORMAT,
+        "format": 1,
         "name": result.attrs.get("name", ""),
         "formula": result.attrs.get("formula", ""),
         "count": int(picked.size),
@@ -78,8 +75,9 @@ def scene(
         "gears": [{"name": name, **circle} for name, pair in facts["gears"].items() for circle in pair],
         "drivers": _drivers(rows, free),
         "units": units_of(result),
-        "sums": {name: series(column(rows, name)) for name in SUMS
-                 if name in rows and not ("steady" in result.attrs and name in DRIVEN)},
+        # of a steady cycle the efficiency at a position says nothing: the flywheel does the work
+        "sums": {name: series(column(rows, name)) for name in ("useful_power", "efficiency_instant")
+                 if name in rows and not ("steady" in result.attrs and name == "efficiency_instant")},
         "efficiency": numbers(efficiency.reshape(1))[0] if efficiency is not None and not efficiency.ndim else None,
         "built": built(rows, before),
     }  # fmt: skip

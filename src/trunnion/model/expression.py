@@ -163,8 +163,7 @@ def parse(text: str) -> Expression:
         raise UnitError(f"'{text}' divides by {under} {unit_text}", f"write {size:.12g} {unit_text}")
     source, operands = _tokens(normalise(text))
     try:
-        tree = ast.parse(source, mode="eval").body
-        depth = _depth(tree)
+        depth = _depth(tree := ast.parse(source, mode="eval").body)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise UnitError(f"'{text}' cannot be read", "check operators and parentheses") from None
     if depth > MAX_DEPTH:

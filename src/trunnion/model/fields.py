@@ -171,8 +171,7 @@ def course_kind(mechanism: Fields, measure: Measure) -> Kind:
             formula = measure.formula
             return _of_dimension(formula.dimension(operand_dimensions(mechanism, measure)) if formula else None)
         return ANY
-    both = MEASURES[measure.kind].quantities
-    return both[-1 if slides(mechanism, measure) else 0]
+    return MEASURES[measure.kind].quantities[-1 if slides(mechanism, measure) else 0]
 
 
 def slides(mechanism: Fields, measure: Measure) -> bool:

@@ -372,8 +372,7 @@ def merge_joint(
     """
     pin, guide = joint.pin, joint.guide
     if joint.pair.turns and (pin or defaults.pin):
-        floats = joint.pair.pivot
-        default = {key: size for key, size in stated(defaults.pin).items() if key != "end_float" or floats}
+        default = {key: size for key, size in stated(defaults.pin).items() if key != "end_float" or joint.pair.pivot}
         pin = Pin(**_pin(default, stated(pin), limits, dimensions))
     if joint.pair.guided and (guide or defaults.guide):
         guide = Guide(**{**stated(defaults.guide), **stated(guide)})

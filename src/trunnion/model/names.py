@@ -90,8 +90,7 @@ class ParameterNames:
             raise MechanismError(Finding(f"the name '{name}' {why}", remedy=f"say which: {examples}"))
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
-        every = [*self.paths, *self.endings]
-        remedy = nearest(name, every if "." in name or not dimensions else dimensions)
+        remedy = nearest(name, [*self.paths, *self.endings] if "." in name or not dimensions else dimensions)
         raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 
     @cached_property

@@ -87,8 +87,7 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
             if size == 2 or entry.location[-1] != "inertia" or "inertia" in link.model_fields_set:
                 yield entry  # a spatial link has a tensor or nothing, never one number
         if link.centre is None:
-            origin = (Quantity(0, KINDS["length"]),) * size
-            yield from walk(origin, f"links.{name}.centre", ("links", name, "centre"))
+            yield from walk((Quantity(0, KINDS["length"]),) * size, f"links.{name}.centre", ("links", name, "centre"))
     for row, loop_joint in enumerate(mechanism.loop):
         for key in ("twist", "distance", "slide", "rotation"):
             yield from walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))

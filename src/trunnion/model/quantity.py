@@ -150,8 +150,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
         if found_dimension is not None and not (
             fits(deviation.dimension, found_dimension) and fits(found_dimension, deviation.dimension)
         ):
-            other = dimension_text(found_dimension)
-            raise UnitError(f"{what}, the value {other}", "give both the same unit")
+            raise UnitError(f"{what}, the value {dimension_text(found_dimension)}", "give both the same unit")
         if (own_unit or unit) and not kind.accepts(deviation.dimension):
             raise UnitError(what)
         deviations.append(-deviation.value if number.startswith("-") else deviation.value)

@@ -48,8 +48,7 @@ class Variable:
 
     def blank(self, sizes: Mapping[str, int]) -> NDArray[Any]:
         """An array to be filled: NaN, or 0 of whole numbers."""
-        floating = self.dtype is not np.float64
-        return np.full([sizes[dim] for dim in self.dims], 0 if floating else np.nan, self.dtype)
+        return np.full([sizes[dim] for dim in self.dims], np.nan if self.dtype is np.float64 else 0, self.dtype)
 
 
 TIME = Variable(("position",), "s", "time from the start of the cycle")

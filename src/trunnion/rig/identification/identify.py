@@ -388,8 +388,7 @@ class _Identified:
         fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
         longest = max(len(condition.phase) for condition in conditions)
         sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
-        variables = {name: variable for name, variable in VARIABLES.items() if variable.dims}
-        arrays = {name: var.blank(sizes) for name, var in variables.items() if set(var.dims) <= set(sizes)}
+        arrays = {name: var.blank(sizes) for name, var in VARIABLES.items() if var.dims and {*var.dims} <= {*sizes}}
         for k, condition in enumerate(conditions):
             arrays["phase"][k, : len(condition.phase)] = condition.phase
         allowed = fit.allowed(self.x)

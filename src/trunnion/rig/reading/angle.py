@@ -17,7 +17,7 @@ from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_f
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import DataTable
-from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, missing, unit_of, warning
+from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, missing, unit_of
 
 __all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 
@@ -53,7 +53,7 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, say: Say) 
         index = _edges(line.rows(table.columns[source.index.column].values), line)
         if not index.size:
             what, remedy = f"the column '{source.index.column}' has no pulse", "check the column, or remove index"
-            say(warning("index.none", "angle.index", what, remedy))
+            say(Finding.warning("data.index.none", "angle.index", what, remedy))
     if column is not None:
         readings = np.array(line.rows(column.values))
         say(missing("angle", column, readings, line.seconds))
@@ -175,7 +175,7 @@ def _by_index(times: Array, counts: Array, slack: float, index: Array, per_turn:
         what = f"the encoder: {counted(lost, 'pulse')} lost, {more:,} too many in "
         what += f"{counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}; "
         what += f"corrected at the index, these turns are left out; usual are {np.median(between):.4g} a turn"
-        say(warning("pulses.lost", "angle", what, "check encoder, cable and counter, and per_turn"))
+        say(Finding.warning("data.pulses.lost", "angle", what, "check encoder, cable and counter, and per_turn"))
     turn = np.clip(np.searchsorted(index, times, side="right") - 1, 0, index.size - 1)
     spoilt = np.column_stack([index[:-1][wrong], index[1:][wrong]])
     return counts - at[0] - sense * fraction - sense * level[turn], spoilt

@@ -37,14 +37,12 @@ from trunnion.rig.reading.turns import (
     left_in_turns,
     lost,
     missing,
-    note,
     resampled,
     runs,
     time_mean,
     timeline,
     turn_means,
     unit_of,
-    warning,
 )  # fmt: skip
 from trunnion.rig.reading.units import SensorScale, alike, default_unit, unit_name
 
@@ -179,7 +177,8 @@ class _Recording:
             say(f"low-pass filter: Butterworth of {passes}{mapping.filter.cut_off.value:g} Hz")
             if not line.even:
                 what = "the samples are not evenly spaced in time, as a filter needs them"
-                say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
+                remedy = "record at a fixed rate, or leave out the filter"
+                say(Finding.warning("data.filter.uneven", "filter", what, remedy))
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.readings[name] = np.array(line.rows(column.values))
@@ -220,24 +219,24 @@ class _Recording:
         turns, positions = self.turns, self.mapping.positions
         if turns.numbers.size < 2:
             what = "has one turn: there is no scatter, so no uncertainty"
-            yield warning("turns.one", "turns", what, "record two turns or more")
+            yield Finding.warning("data.turns.one", "turns", what, "record two turns or more")
         speeds = 60 / (turns.end - turns.begin)
         spread = float(np.ptp(speeds) / np.mean(speeds))
         if spread > STEADY + 2 * turns.line.step / float(np.mean(turns.end - turns.begin)):
             what = f"the speed is not steady: {speeds.min():.4g} to {speeds.max():.4g} cycles a minute"
-            yield warning("speed.unsteady", "turns", what, "state files: over: to use the steady part")
+            yield Finding.warning("data.speed.unsteady", "turns", what, "state files: over: to use the steady part")
         if turns.density < DENSE:  # no fault of the readings
             samples = turns.density * positions
             what = f"{samples:.4g} samples a turn for {positions} positions: values are interpolated; means of samples "
             what += f"with up to {int(samples / DENSE)} positions"
-            slow = warning if turns.density < SPARSE else note
-            yield slow("sampling.slow", "turns", what) if turns.density < 1 else what
+            severity = Severity.WARNING if turns.density < SPARSE else Severity.NOTE
+            yield Finding.weighed(severity, "data.sampling.slow", "turns", what) if turns.density < 1 else what
         for name, channel in self.mapping.channels.items():
             for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
                 if inside := int(np.sum((turns.begin < high.value) & (turns.end > low.value))):
                     what = f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into "
                     what, remedy = what + counted(inside, "turn"), "state a stretch without load"
-                    yield warning("zero.in_turns", f"channels.{name}.zero", what, remedy)
+                    yield Finding.warning("data.zero.in_turns", f"channels.{name}.zero", what, remedy)
 
     def condition(self, steps: Mapping[StepKey, float]) -> Condition:
         """The condition of the file, with courses and what was set. steps: of the readings."""
@@ -293,7 +292,7 @@ class _Recording:
                 course = resampled(turns, values - slope * (turns.line.seconds - since), angle)
                 zero_error = float(np.hypot(zero_error, at_ends))
             remedy = "let sensor and bearings warm up, or state drift: remove"
-            self.say(warning("zero.drift_files", f"channels.{name}", what, remedy))
+            self.say(Finding.warning("data.zero.drift_files", f"channels.{name}", what, remedy))
         total = float(np.hypot(size * scale.reading(channel.accuracy.zero, "accuracy.zero"), zero_error))
         accuracy = Accuracy(total, channel.accuracy.gain.value, size * step * coarse, zero_error, datum=sensor.datum)
         read_in = (sensor.unit, scale.raw) if sensor.unit and scale.direct else ("", 1.0)  # not of volts and the like
@@ -352,12 +351,11 @@ def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: 
         if count := int(np.count_nonzero(rows)):
             what = lost(f"clipped at the end of the range of {limit:.6g} {unit} or beyond", rows, line.seconds)
             remedy = "use a larger range or a smaller load, or correct column, unit, gain and range in the mapping"
-            finding = warning("readings.clipped", where, what, remedy)
-            finding = replace(finding, figures={"count": count, "readings": readings})
+            figures = {"count": count, "readings": readings}
             if count > MOST * readings:  # the rest says nothing of the channel
-                raise MechanismError(replace(finding, severity=Severity.ERROR))
+                raise MechanismError(Finding.error("data.readings.clipped", where, what, remedy, **figures))
             values[rows] = np.nan
-            say(finding)
+            say(Finding.warning("data.readings.clipped", where, what, remedy, **figures))
     step = scale.reading(channel.resolution, "resolution") if channel.resolution else 0.0
     if isinstance(zero, Zero):
         say(f"zero of {name}: mean over the unloaded stretch")
@@ -381,7 +379,8 @@ def _unloaded(where: str, zero: Zero, values: Array, line: Timeline, say: Say) -
             remedy = "state a stretch in which the sensor is not loaded"
             raise MechanismError(Finding(what, f"{where}.zero", remedy, code="data.zero.no_readings"))
         if far.any():
-            say(warning("readings.spikes", f"{where}.zero", lost("spikes", far, line.seconds[rows]), "check shielding"))
+            what = lost("spikes", far, line.seconds[rows])
+            say(Finding.warning("data.readings.spikes", f"{where}.zero", what, "check shielding"))
         times.append(line.seconds[rows][good])
         parts.append(values[rows][good])
     means = [float(np.mean(part)) for part in parts]
@@ -490,7 +489,8 @@ def faults(where: str, readings: Array, turns: Turns, running: slice, near: slic
         return
     if finite.min() == finite.max():
         what = f"reads {finite[0]:.6g} in every one of {finite.size:,} rows"
-        yield (warning if moves else note)("readings.constant", where, what, "check that the sensor is connected")
+        severity, remedy = Severity.WARNING if moves else Severity.NOTE, "check that the sensor is connected"
+        yield Finding.weighed(severity, "data.readings.constant", where, what, remedy)
         return
     for kind, rows, check in (("stuck", running, _stuck), ("spikes", near, spikes)):
         mask = check(readings[rows])
@@ -505,8 +505,11 @@ def faults(where: str, readings: Array, turns: Turns, running: slice, near: slic
             mask[place[order[alike]]] = mask[place[after[alike]]] = False
         if begin.size >= FEW and mask.any() and not often:
             readings[rows][mask] = np.nan
-            what = lost(kind, mask, seconds[rows])
-            yield warning(f"readings.{kind}", where, what, "check sensor, shielding and logger")
+            what, remedy = lost(kind, mask, seconds[rows]), "check sensor, shielding and logger"
+            if kind == "stuck":
+                yield Finding.warning("data.readings.stuck", where, what, remedy)
+            else:
+                yield Finding.warning("data.readings.spikes", where, what, remedy)
 
 
 def _stuck(part: Array) -> Mask:
@@ -581,7 +584,7 @@ def signs(sensors: Mapping[str, Sensor], signals: Mapping[str, Signal], turning:
             unit, size = signals[rate].shown
             what = f"the angle turns at {turning / size:.4g} {unit}, {ratio:.4g} times what '{rate}' reads"
             remedy = f"write sign: {-sensors[rate].channel.sign}, or correct unit and gain, or per_turn of angle"
-            yield warning("rate.ratio", f"channels.{rate}", what, remedy)
+            yield Finding.warning("data.rate.ratio", f"channels.{rate}", what, remedy)
     other = free[0] if len(free) == 1 else None
     pairs = [(name, rates.get(load, other)) for load, name in loads.items() if other or load in rates]
     if abs(ratio + 1) > APART:  # else that explains it
@@ -597,4 +600,4 @@ def signs(sensors: Mapping[str, Sensor], signals: Mapping[str, Signal], turning:
             what = f"sign: the power of {effort.measures} is negative in {below:,} of {counted(power.size, 'turn')} "
             sign = -sensors[name].channel.sign
             remedy = f"write sign: {sign}, or turn the speed or sign: in angle:, if that is wrong"
-            yield warning("power.sign", f"channels.{name}", f"{what}({power.mean():.4g} W)", remedy)
+            yield Finding.warning("data.power.sign", f"channels.{name}", f"{what}({power.mean():.4g} W)", remedy)

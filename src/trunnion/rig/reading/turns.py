@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.errors import Finding, MechanismError, counted
 from trunnion.model.units import UnitError, normalise
 from trunnion.rig.reading.mapping import TimeBase
 from trunnion.rig.reading.tables import Column, DataTable
@@ -28,8 +28,8 @@ from trunnion.rig.reading.units import alike, dimensions
 
 __all__ = [
     "DENSE", "GAP", "TURN", "LeftOfSteps", "Say", "Timeline", "Turns", "at_times", "counted", "covariance_of_steps",
-    "cut", "gathered", "in_step", "joined", "left_in_turns", "left_of_steps", "lost", "missing", "noise_before", "note",
-    "resampled", "runs", "time_mean", "timeline", "turn_means", "unit_of", "warning",
+    "cut", "gathered", "in_step", "joined", "left_in_turns", "left_of_steps", "lost", "missing", "noise_before",
+    "resampled", "runs", "time_mean", "timeline", "turn_means", "unit_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -108,7 +108,7 @@ def _rising(seconds: Array, say: Say) -> Timeline:
         what += at_times(highest[finite & ~rises])
         if back.any():
             what += f"; it runs backward {counted(int(back.sum()), 'time')} by up to {-np.diff(clock).min():.4g} s"
-        say(warning("time.backward", "time", what, "check the logger's clock, or split the file"))
+        say(Finding.warning("data.time.backward", "time", what, "check the logger's clock, or split the file"))
     steps = np.diff(clean)
     step = float(np.median(steps))
     if float(clean[-1]) - float(clean[0]) >= COUNTED * step:
@@ -119,7 +119,7 @@ def _rising(seconds: Array, say: Say) -> Timeline:
         samples, longest = int(np.sum(np.rint(steps[gaps] / step) - 1)), int(gaps[np.argmax(steps[gaps])])
         what = f"{counted(gaps.size, 'gap')} in time, {counted(samples, 'sample')} missing, the longest "
         what += f"{steps[longest]:.4g} s at {clean[longest]:.5g} s"
-        say(warning("time.gaps", "time", what, "check the logger's buffer"))
+        say(Finding.warning("data.time.gaps", "time", what, "check the logger's buffer"))
     return Timeline(clean, rising, step, float(np.std(steps[~wide] / step)) < UNEVEN, clock[:-1][back])
 
 
@@ -132,7 +132,7 @@ def unit_of(where: str, name: str, column: Column, in_mapping: str | None, usual
     unit = in_mapping or in_file or usual
     if usual and not (in_mapping or in_file):
         what = f"the column '{name}' has no unit; SI is assumed ({usual})"
-        say(note("unit.none", where, what, f"state {where}.unit"))
+        say(Finding.note("data.unit.none", where, what, f"state {where}.unit"))
     try:
         factor, kind = dimensions(unit) if unit else (1.0, {})
     except UnitError as error:
@@ -145,21 +145,11 @@ def unit_of(where: str, name: str, column: Column, in_mapping: str | None, usual
         size, of_file = dimensions(in_file) if in_mapping and in_file else (factor, kind)
         if not (alike(of_file, kind) and np.isclose(size, factor, rtol=1e-12, atol=0)):
             what = f"the file has the unit '{in_file}' for '{name}', the mapping '{in_mapping}', which is taken"
-            say(warning("unit.differs", where, what, f"correct {where}.unit, or remove it"))
+            say(Finding.warning("data.unit.differs", where, what, f"correct {where}.unit, or remove it"))
     return unit, factor
 
 
 # ---- findings about data, and places in time -------------------------------------------------------------------
-
-
-def warning(code: str, where: str, what: str, remedy: str = "") -> Finding:
-    """A fault of the data."""
-    return Finding(what, where, remedy, Severity.WARNING, code=f"data.{code}")
-
-
-def note(code: str, where: str, what: str, remedy: str = "") -> Finding:
-    """Something to know."""
-    return Finding(what, where, remedy, Severity.NOTE, code=f"data.{code}")
 
 
 def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
@@ -206,8 +196,8 @@ def missing(where: str, column: Column, readings: Array, seconds: Array) -> Find
     readings[np.isinf(readings)] = np.nan
     mask = np.isnan(readings)
     example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
-    what = lost(f"dropouts{example}", mask, seconds, "cell")
-    return warning("readings.missing", where, what, "check sensor, cable and logger") if mask.any() else None
+    what, remedy = lost(f"dropouts{example}", mask, seconds, "cell"), "check sensor, cable and logger"
+    return Finding.warning("data.readings.missing", where, what, remedy) if mask.any() else None
 
 
 # ---- turns ----------------------------------------------------------------------------------------------------
@@ -275,7 +265,8 @@ def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Arr
         left_out = int(np.sum(np.maximum(np.rint(lengths[odd] / usual), 1)))  # over a gap it may be several
         span = f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
         what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
-        say(note("turns.unusual", "turns", what, "the drive starts, stops or rests there, or rows are missing"))
+        remedy = "the drive starts, stops or rests there, or rows are missing"
+        say(Finding.note("data.turns.unusual", "turns", what, remedy))
     good = ~odd
     for start, stop in spoilt:
         slack = min(line.step, 0.25 * (stop - start))  # an index may lie where a turn begins

@@ -110,7 +110,7 @@ class Rig(Part):
     A rig that exists is sound by itself; whether it fits a mechanism is told when it is put to it (`observe`).
     """
 
-    version: Literal[1] = Field(default=1, alias="trunnion-rig")
+    version: Literal[1] = Field(alias="trunnion-rig")
     name: str = ""
     notes: str = ""
     set_: Mapping[str, Value] = Field(default={}, alias="set")
@@ -135,9 +135,6 @@ class Rig(Part):
         """The rig of a file; MechanismError with file, line and remedy of every finding."""
         path = Path(path)
         data, lines = read_entries(path, "a rig file", "start from examples/rig/cardan-rig.yaml")
-        if "trunnion-rig" not in data:
-            what = "is no rig file: the key 'trunnion-rig' is missing"
-            raise MechanismError(Finding(what, "", "begin the file with trunnion-rig: 1", line=1, file=str(path)))
         try:
             return cls(**data)
         except MechanismError as error:
@@ -198,10 +195,6 @@ def _unsound(rig: Rig) -> Iterable[Finding]:
         where = f"sensors.{name}"
         if sensor.bits and not (sensor.span or sensor.range):
             yield Finding("has bits and neither span nor range", f"{where}.bits", "state span: 10 V")
-        if sensor.span and not sensor.bits:
-            yield Finding("is a span without bits", f"{where}.span", "state bits: 16")
-        if sensor.sensitivity and sensor.sensitivity.value == 0:
-            yield Finding("is zero", f"{where}.sensitivity", "state reading per quantity: 100 mV/(N m)")
         if sensor.per_turn and not sensor.measures.startswith("rate:"):
             yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
 

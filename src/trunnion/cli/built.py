@@ -143,7 +143,10 @@ def allocate(
             mechanism, measure, by, target, steps, at, samples, seed,
             curve, exact=exact, sure=sure, jobs=jobs, progress=progress,
         )  # fmt: skip
-    allocated, findings = bool(result.attrs["found"]), _named(findings_of(result), mechanism)
+    # findings about costs by the names that the file has for them
+    names = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in mechanism.cost_paths(name)}
+    findings = [replace(finding, where=names.get(finding.where, finding.where)) for finding in findings_of(result)]
+    allocated = bool(result.attrs["found"])
     if not allocated:  # there is nothing to draw then
         files.out = [path for path in files.out or () if path.suffix.lower() not in IMAGES]
 
@@ -168,10 +171,3 @@ def _bought(mechanism: "Mechanism", result: "xr.Dataset") -> "Mechanism":
     options = {path: width for path, width in widths.items() if made[path]}
     others = {path: width for path, width in widths.items() if not made[path]}
     return mechanism.with_tolerances(options).with_tolerances(others, DIGITS)
-
-
-def _named(findings: list[Finding], mechanism: "Mechanism") -> list[Finding]:
-    """Findings about costs by the names that the file has for them."""
-
-    names = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in mechanism.cost_paths(name)}
-    return [replace(finding, where=names.get(finding.where, finding.where)) for finding in findings]

@@ -226,9 +226,8 @@ class Fit:
         modelled, datum = self.courses(x)[block.condition], block.signal.accuracy.datum
         value, slope = modelled.values[block.channel], modelled.slopes[block.channel]
         acting = [(s, error.kind, error.sizes[k]) for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]
-        zero, gain, angle = (
-            float(sum(size * x[s] for s, kind, size in acting if kind == of)) for of in ("zero", "gain", "angle")
-        )
+        zero, gain, angle = (float(sum(size * x[s] for s, kind, size in acting if kind == of))
+                             for of in ("zero", "gain", "angle"))  # fmt: skip
         by_share = self.model.by_share(block.condition, value) if any(kind == "angle" for _, kind, _ in acting) else 0.0
         if angle:
             slope = slope - angle * self.model.by_share(block.condition, slope)
@@ -382,8 +381,7 @@ def sizes_of(fit: Fit, x: Array) -> Array:
     """How large each unknown is: by the model or the estimate; of one that is 0, what would change the data visibly."""
     sizes = [max(unknown.size, abs(value)) for unknown, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
     pulled = np.linalg.norm(fit.jacobian(x), axis=0)
-    data = float(
-        np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].signal.mean) ** 2 * fit.weight(k)) for k in fit.fitted))
-    )
+    squares = [np.sum(np.nan_to_num(fit.blocks[k].signal.mean) ** 2 * fit.weight(k)) for k in fit.fitted]
+    data = float(np.sqrt(sum(squares)))
     every = [size or (EFFECT * data / by if by else 1.0) for size, by in zip(sizes, pulled[: fit.count], strict=True)]
     return np.array(every + [1.0] * len(fit.sensors))

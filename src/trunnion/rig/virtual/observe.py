@@ -531,9 +531,8 @@ def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, 
             row[gaps & (before | after)] = 0.0  # of more than one position; at the ends of a period too
         finite = np.isfinite(row)
         if finite.any() and not finite.all():
-            row[~finite] = np.interp(
-                time[~finite], time[finite], row[finite], period=run.cycle.duration * periodic or None
-            )
+            period = run.cycle.duration * periodic or None
+            row[~finite] = np.interp(time[~finite], time[finite], row[finite], period=period)
     return values, status
 
 

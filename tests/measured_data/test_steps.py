@@ -1,4 +1,4 @@
-"""The error by steps that all turns repeat, against readings that are rounded one by one."""
+"""The error by steps that all turns repeat, against readings that are rounded one by one; the steps of a channel."""
 
 from __future__ import annotations
 
@@ -63,31 +63,34 @@ def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, noise
         assert told[0, 0] > 4 * np.sum(columns[0] ** 2) * left_of_steps(noise) / 12
 
 
-def recorded(folder: Path, rpm: float, noise: float, step: float = 0.1) -> Measurement:
-    """A rocker that is read in steps, at 200 Hz; at 60 rpm all turns are sampled at the same places."""
-    random = np.random.default_rng(3)
-    time = np.arange(int(14 * 60 / rpm * 200)) / 200
-    angle = rpm * np.pi / 30 * time + 1
-    told = step * np.rint((np.degrees(rocker(angle)) + noise * step * random.normal(size=time.size)) / step)
-    rows = zip(time, np.degrees(angle) % 360, told, strict=True)
-    (folder / "a.csv").write_text("\n".join(["t;phi;psi", *(f"{t:.4f};{a:.4f};{x:.3f}" for t, a, x in rows)]))
-    return read_measured(
-        {
-            "trunnion-data": 1,
-            "time": {"column": "t", "unit": "s"},
-            "angle": {"from": "column", "column": "phi", "unit": "deg"},
-            "channels": {"psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"}},
-            "positions": 180,
-        },
-        [folder / "a.csv"],
-    )
+MAPPING: dict[str, Any] = {
+    "trunnion-data": 1,
+    "time": {"column": "t", "unit": "s"},
+    "angle": {"from": "column", "column": "phi", "unit": "deg"},
+    "channels": {"psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"}},
+}
+
+
+def recorded(path: Path, time: Array, angle: Array, psi: Array, decimals: int = 3, **changes: Any) -> Measurement:
+    """Times, s, angles of the crank, rad, and readings of the rocker, deg, as a file that is read."""
+    rows = zip(time, np.degrees(angle) % 360, psi, strict=True)
+    path.write_text("\n".join(["t;phi;psi", *(f"{t:.6f};{a:.6f};{x:.{decimals}f}" for t, a, x in rows)]))
+    return read_measured(MAPPING | changes, [path])
+
+
+def repeated(path: Path, values: Array, decimals: int) -> Measurement:
+    """`values`, deg, of a turn that all twelve repeat, at 60 rpm."""
+    place = np.arange(13 * values.size)
+    return recorded(path, place / values.size, 2 * np.pi * place / values.size, np.resize(values, place.size), decimals)
 
 
 @pytest.mark.parametrize(("rpm", "noise", "same"), [(60, 0.2, True), (60, 0.0, True), (59.1, 0.2, False)])
 def test_turns_that_are_sampled_at_the_same_places(tmp_path: Path, rpm: float, noise: float, same: bool) -> None:
     """What is said to be uncertain in the mean of a position is what it is off by, whatever repeats of it."""
-    found = recorded(tmp_path, rpm, noise)
-    (condition,) = found.conditions
+    time = np.arange(int(14 * 60 / rpm * 200)) / 200  # at 60 rpm all turns are sampled at the same places
+    angle = rpm * np.pi / 30 * time + 1
+    noisy = np.degrees(rocker(angle)) + noise * 0.1 * np.random.default_rng(3).normal(size=time.size)
+    (condition,) = recorded(tmp_path / "a.csv", time, angle, 0.1 * np.rint(noisy / 0.1), positions=180).conditions
     course = condition.courses["psi"]
     assert course.accuracy.resolution == pytest.approx(np.radians(0.1))
     assert course.accuracy.left is not None
@@ -105,3 +108,36 @@ def test_turns_shorter_than_half_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     short: Any = SimpleNamespace(begin=times, end=times + 0.2, line=SimpleNamespace(step=1.0), rows=rows)
     left = steps.left_in_turns(short, np.zeros((10, 4)), np.arange(100) % 2 - 0.5, 0.0)
     assert left.noise == pytest.approx((1 / 2 - 1 / 12) ** 0.5, rel=1e-3)
+
+
+TURN = np.radians(360 * np.arange(1000) / 1000)
+
+
+@pytest.mark.spread(6)
+@pytest.mark.parametrize("samples", [20, 200, 1000, 4000])
+@pytest.mark.parametrize("step", [0.001, 0.1, 0.5, 2.0, 20 / 2**7])
+def test_steps_count_where_turns_repeat(tmp_path: Path, step: float, samples: int) -> None:
+    """Each reading is off by what is rounded, all by what may be cut off: step/√12 each (GUM F.2.2.1)."""
+    true = np.degrees(rocker(TURN[:: 1000 // samples] if samples <= 1000 else np.arange(4000) * np.pi / 2000))
+    found = repeated(tmp_path / "a.csv", np.floor(true / step) * step, 6)
+    course = found.conditions[0].courses["psi"]
+    levels = np.unique(np.floor(true / step)).size  # of few that lie apart, the last decimal is known alone
+    told = course.accuracy.resolution / np.radians(step)
+    assert told == pytest.approx(1.0, rel=1e-3) or (samples == 20 and told <= 1.001 and levels < 30)
+    if samples > 20:
+        assert np.median(course.scatter) < 1e-3 * np.radians(step)
+        assert np.median(course.uncertainty) == pytest.approx(np.radians(step) / np.sqrt(6.0), rel=1e-3)
+
+
+def test_a_channel_has_one_step_of_all_its_files(tmp_path: Path) -> None:
+    """One file spans three steps, and by itself hardly shows them; the other many."""
+    psi = np.degrees(rocker(TURN[::2]))
+    few = 100 + 0.15 * (psi - psi.min()) / np.ptp(psi)
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path, values in zip(paths, (few, psi), strict=True):
+        repeated(path, np.rint(10 * values) / 10, 1)
+    for files in (paths, paths[:1]):
+        for condition in read_measured(MAPPING, files).conditions:
+            course = condition.courses["psi"]
+            assert course.accuracy.resolution == pytest.approx(np.radians(0.1))
+            assert np.median(course.uncertainty) == pytest.approx(np.radians(0.1) / np.sqrt(6.0), rel=0.01)

@@ -349,7 +349,7 @@ REFUSED = [
     ("model", {"tables": {"my table": TWO}}, "cannot be used in an expression"),
     ("model", {"dimensions": {"drive": 1.0}}, "dimensions.drive: 'drive' is a reserved name of expressions"),
     ("model", {"dimensions": {"L": "2 m * cos(drive)"}}, "drive, speed, time and tables are for loads"),
-    ("model", STILL, "but the model has no driver"),
+    ("model", STILL, "the model has no driver"),
     ("load", {"link": "coupler", "at": "E", "force": [1, 0], "only": "positive"}, "load.only: is stated beside link"),
     ("load", {"joint": "D", "resisting_torque": 1.0, "frame": "link"}, "load.frame: is stated beside joint"),
 ]

@@ -208,6 +208,8 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, names
     remedy = nearest(name, [*names, *moves])
     if not moves and (PLACED in name or name in MOTION or name in mechanism.tables):
         remedy = "motions of joints and points, drive, speed, time and tables are for loads"
+    elif moves and name in MOTION:
+        remedy = "the model has no driver"
     return Finding(f"'{source}' {refers}is not one of the dimensions", path, remedy)
 
 

@@ -54,14 +54,15 @@ class MachineCode:
 
     def __init__(self, program: Program, folder: Path | None = None) -> None:
         with COMPILING:
-            # its file, by what it does, for which processor, made by which versions
-            text = "\0".join((program.text, *_target(), llvmlite.__version__, __version__))
+            # its file, by what it does, for which processor, made by which versions and sources
+            sources = str([path.stat().st_mtime_ns for path in sorted(Path(__file__).parent.glob("*.py"))])
+            text = "\0".join((program.key, *_target(), llvmlite.__version__, __version__, sources))
             folder = cache_directory("compiled") if folder is None else folder
             self.path = folder / f"{hashlib.sha256(text.encode()).hexdigest()}.o"
             code = _read(self.path)
             self.compiled = code is None
             if code is None:
-                module = llvm.parse_assembly(program.text)
+                module = llvm.parse_assembly(program.write())
                 module.verify()
                 code = bytes(_machine().emit_object(module))
                 _keep(self.path, code)

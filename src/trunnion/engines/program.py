@@ -27,18 +27,21 @@ Value = Any  # of llvmlite, which has no types
 
 @dataclass(frozen=True)
 class Program:
-    """The text of a module; names of the inputs, given and by sample, position and both; rows of the table it needs;
-    width: positions at a time, and so the fewest in a row."""
+    """What tells a program from others; names of the inputs, given and by sample, position and both; rows of the table
+    it needs; width: positions at a time, and so the fewest in a row; write: what makes the text of its module."""
 
-    text: str
+    key: str
     inputs: tuple[tuple[str, ...], ...]
     rows: int
     width: int
+    write: Callable[[], str]
 
 
 def program(graph: Graph, outputs: Sequence[int], width: int) -> Program:
     """A program that computes some nodes. Numbers become floats of 64 bits, what is true or false and "byte" bytes."""
-    return _Writer(graph, outputs, width).write()
+    writer = _Writer(graph, outputs, width)
+    key = repr((graph.nodes, graph.loops, graph.inputs, list(outputs), width))
+    return Program(key, writer.names, len(writer.tabled), width, writer.write)
 
 
 def row_program() -> Program:
@@ -62,7 +65,7 @@ def row_program() -> Program:
 
     _counted(builder, first, last, 1, run)
     builder.ret_void()
-    return Program(str(module), ((), (), (), ()), 0, 1)
+    return Program(str(module), ((), (), (), ()), 0, 1, module.__str__)
 
 
 def _counted(builder: Any, low: Value, high: Value, step: int, body: Callable[[Value], None]) -> None:
@@ -89,12 +92,21 @@ class _Writer:
     outputs: Sequence[int]
     width: int
     module: Any = field(default_factory=lambda: ir.Module(name="trunnion"))
-    tabled: Sequence[int] = ()
 
-    def write(self) -> Program:
+    def __post_init__(self) -> None:
         graph, live = self.graph, self.graph.live(self.outputs)
         inputs = [graph.nodes[n].extra for n in live if graph.nodes[n].op == "input"]
-        names = tuple(tuple(name for name in inputs if graph.inputs[name] == kind) for kind in KINDS)
+        self.names = tuple(tuple(name for name in inputs if graph.inputs[name] == kind) for kind in KINDS)
+        level = {n: graph.differs[n] for n in live}
+        if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
+            level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
+        self.nodes = [[n for n in live if level[n] == kind] for kind in KINDS]
+        # what differs by position alone and is read where samples are gone through
+        *_, ahead, each = self.nodes
+        read = {arg for n in each for arg in graph.nodes[n].args} | set(self.outputs)
+        self.tabled = sorted(read & {n for n in ahead if graph.nodes[n].op not in ("input", "loop")})
+
+    def write(self) -> str:
         double = DOUBLE.as_pointer()
         kinds = [*[LONG] * 5, *[double.as_pointer()] * 5, double]
         function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), name="kernel")
@@ -104,24 +116,18 @@ class _Writer:
         self.lanes, self.scalar = Lanes(self.b, self.width, tables), Lanes(self.b, 1, tables)
         self.pointers = [
             {name: self._pointer(argument, k) for k, name in enumerate(array_names)}
-            for argument, array_names in zip(self.arguments[5:9], names, strict=True)
+            for argument, array_names in zip(self.arguments[5:9], self.names, strict=True)
         ]
         self.out = [self._pointer(self.arguments[9], k) for k in range(len(self.outputs))]
-        level = {n: graph.differs[n] for n in live}
-        if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
-            level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
-        stated_nodes, once, ahead, each = ([n for n in live if level[n] == kind] for kind in KINDS)
+        stated_nodes, once, ahead, each = self.nodes
         plain: dict[int, Value] = self._loaded(0, ir.Constant(LONG, 0))
         self._emit(stated_nodes, plain, self.scalar)
         wide = self._spread(plain, [*ahead, *each])
-        # what differs by position alone and is read where samples are gone through
-        read = {arg for n in each for arg in graph.nodes[n].args} | set(self.outputs)
-        self.tabled = sorted(read & {n for n in ahead if graph.nodes[n].op not in ("input", "loop")})
         if self.tabled:
             self._fill_table(ahead, wide)
         self._samples(once, each, plain, wide)
         self.b.ret_void()
-        return Program(str(self.module), names, len(self.tabled), self.width)
+        return str(self.module)
 
     def _spread(self, plain: dict[int, Value], readers: Iterable[int]) -> dict[int, Value]:
         """Plain numbers in all lanes, those that some nodes read or that are outputs."""

@@ -64,7 +64,7 @@ def same_power(one: Mechanism, other: Mechanism, shares: tuple[float, ...] = (0.
     ])  # fmt: skip
     solved = np.isfinite(powers).all(axis=0)
     assert solved.sum() > 1
-    np.testing.assert_allclose(*powers[:, solved], atol=1e-8 * max(1e-4, abs(powers[0, solved]).max()))
+    np.testing.assert_allclose(*powers[:, solved], rtol=0, atol=1e-9 * max(1e-4, abs(powers[0, solved]).max()))
 
 
 @pytest.mark.spread(5, "rssr-.mjcf", "slider-crank-.urdf", "universal-joint-.sdf")

@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
 MOST_EVENTS = 100_000
+AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 WALK = 25  # evaluations by machine code that take about as long as a walk through the modules
 CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 STUCK = 50  # events at one time
@@ -170,6 +171,23 @@ class ActiveMotion(Integration):
                 break
         return float(solver.t), np.array(solver.y), None
 
+    def _failed(self, time: float, row: Array) -> tuple[float, Array]:
+        """Say why there is no next step; a linkage that locks as it runs stops."""
+        self.step = 0.0
+        n, row, soon = self.layout.coordinates, row.copy(), AHEAD / float(np.max(self.pace))
+        ahead, later = row.copy(), row.copy()
+        ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
+        later[:n] += soon * row[n : 2 * n]
+        causes = [self._cause(*state) for state in ((time, row), (time, ahead), (time + soon, later))]
+        if self._locked(time, row, causes):
+            return time, row
+        code = next(filter(None, causes), "step")
+        if code == "not_assembled" and not causes[0] and not self.motion.several:  # it can be assembled until then
+            self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
+        else:
+            self._stop(code, time, row)
+        return time, row
+
     def _add(self, full: Stretch, crossing: Crossing | None) -> None:
         """Add a step, up to where its mode changes or the motion ends in it."""
         stretch, stretches = full if crossing is None else full._replace(end=crossing.time), self.solution.stretches
@@ -236,7 +254,7 @@ class ActiveMotion(Integration):
         if not at.senses:
             return np.empty((0, len(at.time)))
         if np.all(senses != 0):
-            walk, left = self.motion.walk(at, np.zeros_like(at.q)), 0.0 * senses
+            walk, left = self.motion.walk(at), 0.0 * senses
         else:
             accelerated = self.motion.accelerate(at)
             shares = np.asarray(accelerated.shares, float)
@@ -394,10 +412,21 @@ class ActiveMotion(Integration):
         return True
 
     def _locked(self, time: float, row: Array, causes: Sequence[str]) -> bool:
-        """As of any motion; where several coordinates are free, some joints lock."""
-        if not (self.motion.several and self.motion.resisted):
-            return super()._locked(time, row, causes)
-        return bool({"locked", "no_acceleration"} & set(causes)) and self._jammed(time, row, self.mode.senses)
+        """Let joints stop at once, as friction holds them: there is no solution, or it grows faster with the
+        acceleration against the motion than what brakes it."""
+        n = self.layout.coordinates
+        if not self.motion.resisted:
+            return False
+        if self.motion.several:
+            return bool({"locked", "no_acceleration"} & set(causes)) and self._jammed(time, row, self.mode.senses)
+        if row[n] == 0.0:
+            return False
+        if "locked" not in causes:
+            along, against = self.motion.growth(self.moment(time, row))[:: int(np.sign(row[n]))]
+            if "no_acceleration" not in causes or not against <= 0.0 < along:
+                return False
+        self._note(time, "lock", self._stopped(time, row, np.zeros(n)), "J")
+        return True
 
     def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
         """Whether all free coordinates rest from here on, in what resists the joints."""

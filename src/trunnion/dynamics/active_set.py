@@ -226,7 +226,7 @@ class ActiveSet:
         """The stop of some joints as an acceleration over an instant, in which loads are nothing and friction is what
         the reactions to the inertia make it; None where friction cannot hold them."""
         after, instant = [0 if k in joints else sense for k, sense in enumerate(senses)], INSTANT / self.pace
-        speeds = self.motion.speeds(self.motion.walk(at, np.zeros_like(at.q)), 1)
+        speeds = self.motion.speeds(self.motion.walk(at), 1)
         for _ in senses:
             sticks = [k for k, sense in enumerate(after) if sense == 0]
             guess = (self.motion.stopped(at, sticks)[:, None] - at.rate) / instant
@@ -258,6 +258,6 @@ class ActiveSet:
             return None
         if self.of(after, senses).senses is None:
             return None
-        walks = (self.motion.walk(moment, np.zeros_like(at.q)) for moment in (at, after))
+        walks = (self.motion.walk(moment) for moment in (at, after))
         before, left = (single(kinetic_energy(walk)) for walk in walks)
         return Lock(joints, after.rate[:, 0], senses, before - left)

@@ -88,7 +88,7 @@ def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float
             raise refused(name, f"at {place:g} (SI), outside its range from {low:g} to {high:g}")
     layout, first = Layout.of(motion), motion.names[0]
     at = layout.moment(np.zeros(1), row[:, None])
-    for module, margin in zip(motion.meeting, motion.margins(motion.walk(at, np.zeros_like(at.q))), strict=True):
+    for module, margin in zip(motion.meeting, motion.margins(motion.walk(at)), strict=True):
         if single(margin) < TOUCHING:
             links = ", ".join(motion.system.plan.modules[module].links)
             raise refused(first, f"at a change point: two assembly modes of the links {links} coincide there")

@@ -139,9 +139,7 @@ class Guards:
 
         def margins(moments: Array) -> Array:
             rows = np.where(moments < stretch.begin, last.state(moments), onward.state(moments))
-            walk = self.motion.walk(
-                self.layout.moment(moments, rows), np.zeros((self.layout.coordinates, len(moments)))
-            )
+            walk = self.motion.walk(self.layout.moment(moments, rows))
             return np.array([np.broadcast_to(each, moments.shape) for each in self.motion.margins(walk)])
 
         looks, spans = margins(times), np.diff(times)
@@ -198,7 +196,7 @@ def dead_centre(motion: FreeMotion, at: Moment, second: float) -> tuple[float, f
         return None
     left = -0.5 * speed * speed / second
     near_by = repeated(at, 3)._replace(q=np.array([[q, q + (1 - BESIDE) * left, q + (1 + BESIDE) * left]]))
-    walk = motion.walk(near_by, np.zeros((1, 3)))
+    walk = motion.walk(near_by)
     near = np.broadcast_to(walk.condition, (3,))[0] > (NEAR_SINGULAR if motion.affine else RUBBING)
     status = pose_status(walk, (3,))
     ends = near and status[1] != Status.NOT_ASSEMBLED and status[2] == Status.NOT_ASSEMBLED

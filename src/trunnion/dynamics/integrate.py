@@ -37,7 +37,6 @@ Array = NDArray[np.float64]
 FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
 MOST_EVALUATIONS = 2_000_000  # of the forces, if not stated otherwise
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
-AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 SHRUNK = 4  # steps, each no longer than the last, from which a dead centre is looked for
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 NEAR = 1e-8  # of the coordinate: places that are one
@@ -233,40 +232,10 @@ class Integration:
         )
         return float(below[-1]) if len(below) else -np.inf, float(above[0]) if len(above) else np.inf
 
-    def _failed(self, time: float, row: Array) -> tuple[float, Array]:
-        """Say why there is no next step; a linkage that locks as it runs stops."""
-        self.step = 0.0
-        n, row, soon = self.layout.coordinates, row.copy(), AHEAD / float(np.max(self.pace))
-        ahead, later = row.copy(), row.copy()
-        ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
-        later[:n] += soon * row[n : 2 * n]
-        causes = [self._cause(*state) for state in ((time, row), (time, ahead), (time + soon, later))]
-        if self._locked(time, row, causes):
-            return time, row
-        code = next(filter(None, causes), "step")
-        if code == "not_assembled" and not causes[0] and not self.motion.several:  # it can be assembled until then
-            self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
-        else:
-            self._stop(code, time, row)
-        return time, row
-
     def _turns_round(self, time: float, figures: dict[str, float]) -> None:
         """End at the dead centre of the driven joint."""
         self._note(time, "dead-centre")
         self.end("dead_centre", time, figures)
-
-    def _locked(self, time: float, row: Array, causes: Sequence[str]) -> bool:
-        """Let the one free coordinate stop at once, as friction holds it: it has no solution, or it grows faster with
-        the acceleration against the motion than what brakes it."""
-        n = self.layout.coordinates
-        if self.motion.several or not self.motion.resisted or row[n] == 0.0:
-            return False
-        if "locked" not in causes:
-            along, against = self.motion.growth(self.moment(time, row))[:: int(np.sign(row[n]))]
-            if "no_acceleration" not in causes or not against <= 0.0 < along:
-                return False
-        self._note(time, "lock", self._stopped(time, row, np.zeros(n)), "J")
-        return True
 
     def _compare(self, time: float, row: Array) -> None:
         """Tell where there are several accelerations, every few steps: E − T, which is continuous, has other roots than
@@ -313,9 +282,7 @@ class Integration:
         return "" if rates.sound else "locked" if rates.locked else "no_acceleration"
 
     def _assembled(self, at: Moment) -> bool:
-        status = pose_status(self.motion.walk(at, np.zeros_like(at.q)), (1,))
-        return int(status[0]) != Status.NOT_ASSEMBLED
+        return int(pose_status(self.motion.walk(at), (1,))[0]) != Status.NOT_ASSEMBLED
 
     def _kinetic(self, time: float, row: Array) -> float:
-        at = self.moment(time, row)
-        return single(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))
+        return single(kinetic_energy(self.motion.walk(self.moment(time, row))))

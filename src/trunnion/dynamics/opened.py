@@ -111,7 +111,7 @@ def _start(run: Run) -> Forward:
         return run.walk(np.zeros(1))
     motion = FreeMotion.of(run)
     at = Layout.of(motion).moment(np.zeros(1), initial_row(motion)[:, None])
-    return motion.walk(at, np.zeros_like(at.q))
+    return motion.walk(at)
 
 
 def of_several(mechanism: Mechanism) -> list[str]:

@@ -143,7 +143,7 @@ class Walks:
             accelerated = motion.accelerate(at)
             walk, onsets = accelerated.back.walk, accelerated.onsets
         else:
-            walk = motion.walk(at, np.zeros_like(at.q))
+            walk = motion.walk(at)
         rows = seen(motion, walk, onsets)
         return Seen(*(np.array([np.broadcast_to(number, lanes) for number in row]) for row in rows))
 

@@ -272,8 +272,9 @@ class FreeMotion:
         """The numbers of the mechanism with the motion of the free coordinates."""
         return freed(self.values, {name: (at.q[i], at.rate[i], second[i]) for i, name in enumerate(self.names)})
 
-    def walk(self, at: Moment, second: Array) -> Forward:
-        """Motion alone."""
+    def walk(self, at: Moment, second: Array | None = None) -> Forward:
+        """Motion alone, without accelerations if none are given."""
+        second = np.zeros_like(at.q) if second is None else second
         return forward(self.system, self.values_at(at, second), self.assembly, at.time)
 
     def margins(self, walk: Forward) -> list[Number]:
@@ -610,7 +611,7 @@ class FreeMotion:
         """Walks at one moment without rates, then with the unit rate of each coordinate."""
         count = len(self.names)
         many = repeated(at, count + 1)._replace(rate=np.eye(count, count + 1, 1))
-        return self.walk(many, np.zeros((count, count + 1)))
+        return self.walk(many)
 
 
 def _differences(speeds: Array) -> tuple[Array, Array]:

@@ -139,9 +139,8 @@ def allocate(
     what = "the measure has no first-order result: its limits were ignored in the allocation"
     remedy = "check with the samples whether they are met"
     notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in settled.rows.unknown]
-    kind = "discrete" if any(price.choices for price in prices.values()) else "continuous"
     notes += settled.findings
-    allocated = Allocated(criterion, share, settled.study, settled.rows, answer, kind, prices, before, notes, offers)
+    allocated = Allocated(criterion, share, settled.study, settled.rows, answer, prices, before, notes, offers)
     methods: list[Method] = ["linear"]
     if answer.found:
         mechanism = mechanism.with_tolerances(allocated.bought)

@@ -64,7 +64,7 @@ VARIABLES: dict[str, Variable] = {
 
 @dataclass(frozen=True, eq=False)
 class Allocated:
-    """What was found. study: of the tolerances that the rows of the answer belong to; kind: of the choice.
+    """What was found. study: of the tolerances that the rows of the answer belong to.
 
     target: the yield, for that criterion; prices: of what could be bought, by path; before: half widths as stated;
     offers: factors of all limits with their answers.
@@ -75,7 +75,6 @@ class Allocated:
     study: ToleranceStudy
     rows: Rows
     answer: Answer
-    kind: str
     prices: Mapping[str, Price]
     before: Mapping[str, float]
     findings: Sequence[Finding]
@@ -127,7 +126,7 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
         "found": int(allocated.answer.found),
         "criterion": allocated.criterion,
         "target": allocated.target,
-        "choices": allocated.kind,
+        "choices": "discrete" if any(price.choices for price in allocated.prices.values()) else "continuous",
         "proven": int(allocated.answer.proven),
         "prices": [  # JSON has no infinite numbers
             {**asdict(price), "most": price.most if np.isfinite(price.most) else None}

@@ -52,7 +52,10 @@ class CycleKernel:
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
             numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
-        self._names = {f"{cell[0]}{list(cell[1])}": cell for cell, number in numbers.items() if not _zero(cell, number)}
+        # what is 0 whatever the values are, as most arrays are before they are filled, is left out
+        zero = [cell for cell, number in numbers.items() if isinstance(number, (int, float)) and number == 0]
+        empty = {cell for cell in zero if VARIABLES[cell[0]].part not in OF_SOME_JOINTS}
+        self._names = {f"{cell[0]}{list(cell[1])}": cell for cell in numbers if cell not in empty}
         self._kernel = WalkKernel(
             run,
             {name: self._figure(cell) for name, cell in self._names.items()},
@@ -93,11 +96,6 @@ class CycleKernel:
 
     def _figure(self, cell: Cell) -> Figure:
         return lambda back: self._cells(back)[cell]
-
-
-def _zero(cell: Cell, number: Number) -> bool:
-    """Whether a cell is 0 whatever the values are, as most arrays are before they are filled."""
-    return isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part not in OF_SOME_JOINTS
 
 
 def kernel_of(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trunnion.algebra import plane
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, flat
 from trunnion.algebra.space import moment_at, quaternion
 from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.errors import Status
@@ -418,17 +418,12 @@ class Causes:
                 break
             bad = np.zeros(status.shape, bool)
             for frame in pose.frames:
-                bad |= ~np.isfinite(np.broadcast_to(_sum(frame), status.shape))
+                bad |= ~np.isfinite(np.broadcast_to(sum(flat(frame)), status.shape))
             if np.any(bad & left):
                 reasons = _shortfalls(back.walk, number)
                 sizes = np.array([np.broadcast_to(size, status.shape) for size in reasons.values()])
                 self.keep("open", (number, *reasons), bad & left, places, sizes.reshape(len(reasons), len(places)))
             left = left & ~bad
-
-
-def _sum(frame: Any) -> Number:
-    """A number that is finite where every number of a frame is: of a planar one (x, y, c, s), of one of vectors."""
-    return sum(_sum(part) if isinstance(part, tuple) else part for part in frame)
 
 
 def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:

@@ -11,7 +11,7 @@ measure's courses, so that no figure depends on the rows of a table.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -160,6 +160,7 @@ class ToleranceStudy:
     measures: tuple[Measure, ...]
     friction: FrictionMethod
     notes: tuple[Finding, ...] = ()
+    _scans: dict[str, Walked] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def kernel(self) -> NumpyKernel:
@@ -262,10 +263,6 @@ class ToleranceStudy:
             for orders, of_worst in ((courses, False), (worst, True)):
                 orders.append(self._course(measure, parts, of_worst))
         return Table(positions, curves, courses, worst, walked[self.measures[0].name].status)
-
-    @cached_property
-    def _scans(self) -> dict[str, Walked]:
-        return {}
 
     def scanned(self, measure: Measure, of_worst: bool) -> tuple[Array, FirstOrder, NDArray[np.int8]]:
         """Times, s, at which a course is looked through, whatever the steps; its first order there, and statuses.

@@ -24,8 +24,6 @@ from numpy.typing import NDArray
 from trunnion.algebra import panels as reading
 from trunnion.algebra.panels import ENDS, FIT, GAUSS_WEIGHTS, INTEGRAL, ON_GAUSS, ON_GRID, ON_POINTS, ORDER, POINTS
 
-__all__ = ["Accuracy", "Courses", "Place", "Solve"]
-
 Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
 # mechanisms (lane,) and times (lane, node), s, to the rows there, (row, lane, node), and the states, (lane, node)

@@ -16,8 +16,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero, plus
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["cross", "dot", "inverse", "solve", "weighted"]
-
 Vector = tuple[Number, Number]
 Table = NDArray[np.float64]
 SEVERAL, FEW_LANES = 4, 512  # rows from which, and lanes up to which whole rows are quicker

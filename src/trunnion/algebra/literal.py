@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from trunnion.algebra.namespace import Number
 
-__all__ = ["is_zero", "less", "plus", "times"]
-
 
 def is_zero(number: Number) -> bool:
     """A literal zero."""

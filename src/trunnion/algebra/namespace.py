@@ -16,11 +16,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
 
-__all__ = [
-    "Number", "Traced", "UntraceableError", "apart", "cut", "each", "flat", "looped", "namespace", "recurring",
-    "replaced", "zipped",
-]  # fmt: skip
-
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
 Number = Any

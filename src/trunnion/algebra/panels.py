@@ -18,11 +18,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = [
-    "CANCELLED", "ENDS", "FIT", "GAUSS_WEIGHTS", "GRID", "INTEGRAL", "ON_GAUSS", "ON_GRID", "ON_POINTS", "ORDER",
-    "POINTS", "RATE", "Made", "OnGrid", "Top", "above", "extreme", "linear", "selected", "spread_out", "weighted",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Made = Callable[[Any], Number]  # of some rows, (row, …), one number, (…)
 

@@ -16,13 +16,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero, less, plus
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = [
-    "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Twist", "Vector2", "Wrench", "about",
-    "acceleration_at", "added", "bracket", "compose", "distance", "line_of", "minus", "moment_at", "moving", "on_axis",
-    "place_of", "point_of", "power", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned",
-    "turned_vector", "velocity_at",
-]  # fmt: skip
-
 Vector2 = tuple[Number, Number]
 
 

@@ -17,13 +17,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, plus, scaled, transpose
 
-__all__ = [
-    "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Screw", "about", "added", "bracket",
-    "compose", "distance", "element", "line_of", "minus", "moment_at", "moving", "on_axis", "place_of", "point_of",
-    "power", "quaternion", "relative", "rotated", "rotated_moment", "rotation_matrix", "slid", "spin", "times",
-    "turned", "vector_minus", "velocity_at",
-]  # fmt: skip
-
 
 class Frame(NamedTuple):
     """A frame: its axes as the columns of R, and its origin p, m."""

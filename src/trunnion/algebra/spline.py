@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["Ends", "Spline", "look_up", "spline"]
-
 Ends = Literal["clamped", "natural", "periodic"]
 STRAIGHT = 0.0  # coefficient of a power that a straight line does not have
 SLACK = 1e-9  # of the table's extent: a cycle that ends where the table does is inside, whatever the rounding

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-__all__ = ["BOTH", "EXP_RANGE", "POSITION", "SAMPLE", "SINE_RANGE", "Graph", "Loop", "Node"]
-
 SINE_RANGE = 1e5  # rad, within which the sine of a compiled kernel is exact
 EXP_RANGE = 700.0  # neither overflow nor loss of digits
 RANGES = {"sin": SINE_RANGE, "cos": SINE_RANGE, "exp": EXP_RANGE}

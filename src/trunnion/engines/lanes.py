@@ -16,8 +16,6 @@ from llvmlite import ir
 
 from trunnion.engines.graph import EXP_RANGE, SINE_RANGE
 
-__all__ = ["BYTE", "DOUBLE", "INT", "LONG", "Lanes"]
-
 # π/2 in three floats, each the rest that the ones before leave; ln 2 in two
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)

@@ -24,8 +24,6 @@ from trunnion.engines.program import Program
 from trunnion.files import cache_directory
 from trunnion.version import __version__
 
-__all__ = ["COMPILING", "MachineCode", "vector_width"]
-
 Array = NDArray[np.float64]
 COMPILING = Lock()  # LLVM's own state is not made for several threads
 MAGIC = b"trunnion object 1\n"

@@ -20,8 +20,6 @@ from trunnion.engines.graph import BOTH, Graph, Loop
 from trunnion.engines.machine_code import MachineCode, vector_width
 from trunnion.engines.program import program, row_program
 
-__all__ = ["Parts"]
-
 Array = NDArray[np.float64]
 MOST_KINDS = 512  # of parts whose code is kept at hand
 

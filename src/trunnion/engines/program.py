@@ -18,8 +18,6 @@ from llvmlite import ir
 from trunnion.engines.graph import BOTH, POSITION, SAMPLE, Graph
 from trunnion.engines.lanes import BYTE, DOUBLE, LONG, Lanes
 
-__all__ = ["Program", "program"]
-
 KINDS = (0, SAMPLE, POSITION, BOTH)  # what numbers differ by
 COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 Value = Any  # of llvmlite, which has no types

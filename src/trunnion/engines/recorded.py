@@ -16,8 +16,6 @@ import numpy as np
 from trunnion.algebra.namespace import Done, Step, Traced, UntraceableError
 from trunnion.engines.graph import BOTH, Graph
 
-__all__ = ["STRUCTURAL", "Recorded", "number_of"]
-
 STRUCTURAL = (0.0, 1.0, -1.0)  # numbers by which kernels save work: they are compiled in
 MOST_RECURRING = 64  # functions of numbers whose records are kept at hand
 _recurring: dict[Hashable, tuple[Graph, list[int]]] = {}

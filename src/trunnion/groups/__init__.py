@@ -12,6 +12,4 @@ from __future__ import annotations
 from trunnion.groups.dyad import Dyad
 from trunnion.groups.dyads import PRP, RPP, RPR, RRP, RRR
 
-__all__ = ["GROUPS"]
-
 GROUPS: dict[str, Dyad] = {dyad.letters: dyad for dyad in (RRR(), RRP(), RPR(), PRP(), RPP())}

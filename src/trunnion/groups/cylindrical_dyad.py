@@ -20,8 +20,6 @@ from trunnion.groups import ccc
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, Element, Pose
 
-__all__ = ["CylindricalDyad"]
-
 
 class CylindricalDyad(SpatialGroup):
     """Joints in the order outer, inner, outer; links: that of the first outer joint, then the other."""

@@ -37,8 +37,6 @@ from trunnion.algebra.plane import (
     velocity_at,
 )
 
-__all__ = ["Dyad", "DyadPose", "Elements", "pinned", "root", "shifted"]
-
 Elements = Sequence[tuple[Frame, Frame]]  # per joint: its element on the first and on the second link
 ROUNDING = 1e-15  # of the terms of a difference: a few units in the last place
 

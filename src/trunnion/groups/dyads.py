@@ -18,8 +18,6 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame, Vector2, compose, point_of, relative, turned_vector
 from trunnion.groups.dyad import Dyad, DyadPose, Elements, pinned, root, shifted
 
-__all__ = ["PRP", "RPP", "RPR", "RRP", "RRR", "meet"]
-
 
 def meet(b: Vector2, d: Vector2, bc: Number, cd: Number, branch: int) -> Vector2:
     """B→C for the pin C of an RRR group between known pins B and D.

@@ -18,11 +18,6 @@ from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame, Vector2, Wrench, about, times
 
-__all__ = [
-    "NUMBERS", "GearPair", "Mesh", "ToothForce", "actions", "apart", "mesh", "rotation", "slide_of", "thread_forces",
-    "turn_from",
-]  # fmt: skip
-
 # that a module is given for each gear pair, after its drive: ratio, phase, coordinate φ₁ to the nearest turn
 NUMBERS = 3
 

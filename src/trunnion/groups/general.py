@@ -21,8 +21,6 @@ from trunnion.groups.gear import NUMBERS, GearPair, actions, slide_of, turn_from
 from trunnion.groups.tree import Coordinates, Element, Pose, Tree
 from trunnion.joints.pairs import MOTIONS, PairMotion
 
-__all__ = ["General"]
-
 
 @dataclass(frozen=True)
 class General(Tree):

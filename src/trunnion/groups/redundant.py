@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = ["RANK", "Support", "condition", "least", "least_squares", "pseudo_inverse", "stacked", "weighed"]
-
 Array = NDArray[np.float64]
 RANK = 1e-7  # of the largest singular value: below it a direction counts as lost; rounding leaves some 1e-15
 

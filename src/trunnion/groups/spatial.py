@@ -23,8 +23,6 @@ from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
 from trunnion.joints.pairs import MOTIONS, PairMotion
 
-__all__ = ["SpatialGroup", "unspun"]
-
 Array = NDArray[np.float64]
 ROUNDS = 4  # of taking a spin out, each of which leaves the third power
 BEFORE, AFTER = slice(None, -1), slice(1, None)

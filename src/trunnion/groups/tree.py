@@ -32,8 +32,6 @@ from trunnion.groups.gear import NUMBERS
 from trunnion.groups.redundant import Support
 from trunnion.joints.pairs import PAIRS, Pair, PairMotion
 
-__all__ = ["CLOSED", "OUTER", "Coordinates", "Element", "GroupJoint", "Pose", "Step", "Tree"]
-
 OUTER = -1  # stands for every link outside the module: all are known, so they count as one
 QUICK = 8  # rounds for all lanes
 NEWTON_LIMIT = 60  # more for those that need them

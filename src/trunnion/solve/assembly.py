@@ -52,8 +52,6 @@ from trunnion.solve.track import (
 )
 from trunnion.structure.decompose import Module
 
-__all__ = ["Chosen", "choose", "grid", "ways_of"]
-
 Array = NDArray[np.float64]
 
 GRID = 720  # intervals of one turn of the fastest driver, along which general groups are followed

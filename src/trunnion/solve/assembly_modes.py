@@ -16,8 +16,6 @@ from trunnion.solve.hints import joint_rows, way_name
 from trunnion.solve.run import Run
 from trunnion.solve.track import Track
 
-__all__ = ["AssemblyMode", "GroupModes", "choices", "put_together"]
-
 
 @dataclass(frozen=True)
 class AssemblyMode:

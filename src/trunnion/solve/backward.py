@@ -31,11 +31,6 @@ from trunnion.solve.system import Place, System, Values, law_of, law_parameters,
 if TYPE_CHECKING:
     from trunnion.solve.row_code import RowCode
 
-__all__ = [
-    "NEAR_SINGULAR", "Backward", "Given", "Sense", "backward", "by_numpy", "gear_load", "gears_of", "pass_on",
-    "pose_status", "pose_status_number", "row_code", "sense_of", "solve", "status_number", "status_of", "unloaded",
-]  # fmt: skip
-
 MANY_MODULES = 12  # of a row that is solved by machine code: of fewer, loading LLVM takes longer
 SINGULAR = 1e6  # condition from which less than about four digits would be left
 NEAR_SINGULAR = 100.0  # a transmission angle of about a degree

@@ -31,8 +31,6 @@ from trunnion.solve.forward import Assembly, forward
 from trunnion.solve.switches import root
 from trunnion.solve.system import Cycle, System, Values, law_of, rubbing
 
-__all__ = ["History", "histories"]
-
 INTERVALS = 720  # of one turn of the fastest driver
 GROWN = np.linspace(0.0, 1.0, 13) ** 2  # steps on either side of a reversal, by the distance from it
 SLOWEST = 1e-30  # m/s, so that d/|v| has a value at rest

@@ -24,8 +24,6 @@ from trunnion.solve.system import Cycle, System, driven_coordinates
 from trunnion.solve.track import SAME, TOUCHING, Follower, Track, TrackClock, carried_on
 from trunnion.structure.decompose import Module
 
-__all__ = ["Meeting", "Meetings", "folds", "followed_through", "suspects", "through", "touched"]
-
 Array = NDArray[np.float64]
 
 Meeting = tuple[float, float]  # first and last time, s

@@ -28,8 +28,6 @@ from trunnion.solve.friction import Rubbing
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["bearing_ends", "bearing_middle", "contacts_of", "has_pressure", "loads_on_ends"]
-
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
 

@@ -16,8 +16,6 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, looped
 
-__all__ = ["System", "follow", "largest"]
-
 System = Callable[[Sequence[Number], Number], tuple[list[Number], list[list[Number]]]]
 
 FIRST_STEP = 0.05

@@ -28,11 +28,6 @@ from trunnion.model.parts import InertiaTensor
 from trunnion.solve import shifts
 from trunnion.solve.system import Place, System, Values, driven_coordinates
 
-__all__ = [
-    "Assembly", "Forward", "Motion", "PointMotion", "SpatialWalk", "Travel", "Vector", "forward", "pose_of", "posed",
-    "quiet", "start",
-]  # fmt: skip
-
 ZERO_SLIP = 1e-10  # of the speeds about a joint: below it the sign of a relative speed is rounding noise
 Assembly = Sequence[Any]  # per module: ±1 for a closed form, a `branches.Track` for a general group, None for a driver
 Vector = tuple[Number, ...]  # of two components in the plane, of three in space

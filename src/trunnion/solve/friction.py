@@ -34,10 +34,6 @@ from trunnion.solve import continuation
 from trunnion.solve.continuation import largest
 from trunnion.solve.friction_method import FrictionMethod
 
-__all__ = [
-    "Contact", "FrictionProblem", "Rubbing", "Settled", "frictionless", "scaled", "settle", "with_own",
-]  # fmt: skip
-
 WEIGHTED, LIGHTEST = 6, 1e-3  # norms that are tried; least weight, of the largest row sum
 OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
 SETTLED = 1e-11  # of the largest friction: where the iteration ends

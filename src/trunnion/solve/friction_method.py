@@ -10,8 +10,6 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.measure_table import MEASURES
 
-__all__ = ["MARGIN", "FrictionMethod"]
-
 Method = Literal["newton", "successive-approximation"]
 
 

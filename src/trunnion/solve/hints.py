@@ -25,11 +25,6 @@ from trunnion.solve.system import System
 from trunnion.solve.track import lane_of
 from trunnion.structure.decompose import Module
 
-__all__ = [
-    "coordinate", "distance", "drawn_at", "hinted_at", "hints", "joint_rows", "misnamed", "named_way", "off_drawing",
-    "remarks", "spun_sets", "way_name",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Rows = dict[str, tuple[bool, list[Array]]]  # of a joint: whether by its turn; its numbers in every assembly
 ALIKE = 1e-6  # rad, or of the size, and of how far off: positions as near as the nearest

@@ -24,8 +24,6 @@ from trunnion.solve.forward import Forward, forward
 from trunnion.solve.switches import near, turned
 from trunnion.solve.system import Cycle, System, Values, freed
 
-__all__ = ["Inverse", "driven_at_outputs"]
-
 Array = NDArray[np.float64]
 KEPT = ("trunnion", "space", "ground", "dimensions", "links", "joints", "joint_defaults", "gears", "loop", "assembly",
         "over_constraint", "fits")  # fmt: skip

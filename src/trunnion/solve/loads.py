@@ -18,13 +18,6 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.forward import Assembly, Forward, Vector, forward, start
 from trunnion.solve.system import System, Values
 
-__all__ = [
-    "NOTHING_USEFUL", "STATE_USEFUL", "LoadAction", "Share", "SpringState", "Stated", "Switch", "closes",
-    "has_useful_work", "losses", "placed", "spring_state", "springs", "stated_loads", "stated_walk", "useful_loads",
-    "useful_powers", "useful_springs", "useful_weights",
-]  # fmt: skip
-
-
 NOTHING_USEFUL = "there is no load, and no spring or weight is marked useful"  # so that an efficiency is undefined
 STATE_USEFUL = "state what it drives as a load; of what it lifts mark the link useful: true"
 SPLINED = 3  # of a spline every so many points: it bends at none, but may be anything between two that are far apart

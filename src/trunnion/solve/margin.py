@@ -20,8 +20,6 @@ from trunnion.solve.continuation import largest
 from trunnion.solve.friction import Contact, FrictionProblem, frictionless, scaled, with_own
 from trunnion.solve.system import Cycle
 
-__all__ = ["least_beside", "locking_margin", "margin_for_sure", "margin_in"]
-
 Array = NDArray[np.float64]
 
 BESIDE = 1e-8  # of the cycle: how far before and after a time a figure is looked at

@@ -27,8 +27,6 @@ from trunnion.solve.forward import Assembly, Forward, SpatialWalk, forward
 from trunnion.solve.loads import closes
 from trunnion.solve.system import System, Values
 
-__all__ = ["RowCode", "code_of", "leaves_of"]
-
 Array = NDArray[np.float64]
 Pass = Callable[[Forward, Number], Any]  # gives a `Backward` of a walk in a direction, 1 or −1
 

@@ -29,8 +29,6 @@ from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
-__all__ = ["CHUNK", "Run", "blocks", "built", "prepare"]
-
 TURN_STEPS = 720
 COMES_BACK = 1e-6  # of the mechanism's size
 CHUNK = 8192  # solved at a time: the arrays of a walk stay in cache

@@ -43,10 +43,6 @@ from trunnion.solve.system import rubbing
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = [
-    "NO_LOAD", "ROUNDS", "SETTLED", "UNSETTLED", "EndLoads", "Halt", "Seated", "Seating", "loads_of", "seating_of",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 NO_LOAD = 1e-9  # of the largest reaction: a load below it is rounding and presses nothing anywhere
 JUMP = 0.1  # of the largest load of an end: a jump that passes as near to zero crosses the hole

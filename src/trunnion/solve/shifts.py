@@ -23,11 +23,6 @@ from trunnion.model.joint_parts import clearance
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = [
-    "CARRIERS", "HOLE", "PIN", "GivenSeat", "Play", "carriers_of", "given_offsets", "hole", "misaligned", "play_of",
-    "seated", "seats", "unstated_length",
-]  # fmt: skip
-
 Values = Mapping[str, Number]
 Vector = tuple[Number, ...]
 ALGEBRAS: dict[str, Any] = {"planar": plane, "spatial": space}

@@ -28,11 +28,6 @@ from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
-__all__ = [
-    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "near", "root",
-    "shifts_of", "stated_bends", "tracked", "turned", "unwrap_row",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 

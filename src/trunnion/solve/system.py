@@ -34,8 +34,6 @@ from trunnion.results.quantities import readable
 from trunnion.solve import shifts
 from trunnion.structure.decompose import Module, Plan, decompose
 
-__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "build", "freed"]
-
 STATE, FREED = "state.", ("coordinate", "rate", "second")  # paths of what a free driver does
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
 Values = Mapping[str, Number]  # every number of a mechanism by its path, SI

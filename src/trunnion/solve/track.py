@@ -19,11 +19,6 @@ from trunnion.groups.tree import Tree
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
-__all__ = [
-    "GUESSES", "SAME", "SEED", "TOUCHING", "Assemblies", "Follower", "Track", "TrackClock", "alternating", "at",
-    "carried_on", "closed_at", "each_once", "extent", "guess_reaches", "lane_of",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]  # positions of the grid
 Elements = Sequence[Any]  # per joint: both its elements, as nested tuples of numbers

@@ -31,8 +31,6 @@ from trunnion.solve.system import Values, law_of, rubbing
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = ["Figure", "Lanes", "WalkKernel", "lanes_of", "literals", "time_of"]
-
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
 BORDER = 0.99 * NEAR_SINGULAR  # condition from which NumPy decides what a position is

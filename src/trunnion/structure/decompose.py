@@ -20,8 +20,6 @@ from trunnion.structure.generic import GEAR, SPIN, Constraint, Gears, Joints, Pl
 from trunnion.structure.graph import components, longest_loop, matching, ordered
 from trunnion.structure.passive import passive
 
-__all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "mobility_by_rank"]
-
 FREEDOMS = {"planar": 3, "spatial": 6}  # of a free link
 # outer, inner, outer joint of the dyads in closed form, in the plane and in space
 CLOSED_FORMS = {"planar": ("RRR", "RRP", "RPR", "PRP", "RPP"), "spatial": ("CCC",)}

@@ -18,8 +18,6 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.graph import reached
 
-__all__ = ["GEAR", "SPIN", "Constraint", "Gears", "Joints", "Places", "constraints", "fault", "rank"]
-
 GEAR, SPIN = -1, -2
 Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of a gear pair, GEAR; of a link, SPIN
 Joints = Mapping[str, tuple[str, tuple[str, str]]]  # kind and links, by name

@@ -12,8 +12,6 @@ from graphlib import TopologicalSorter
 from heapq import heappop, heappush
 from typing import TypeVar
 
-__all__ = ["components", "longest_loop", "matching", "ordered", "reached"]
-
 Node = TypeVar("Node", bound=Hashable)
 
 

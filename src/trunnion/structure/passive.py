@@ -18,8 +18,6 @@ from trunnion.joints.pairs import PAIRS, Pair
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.graph import reached
 
-__all__ = ["passive"]
-
 IN_LINE = 1e-9  # of the distance: a point that lies on an axis
 
 

@@ -34,8 +34,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates, felt
 from trunnion.solve.track import SEED, at, extent, guess_reaches, lane_of
 
-__all__ = ["Determinacy", "ModuleDeterminacy", "look", "spins_of"]
-
 LOOKED = 12  # positions: what is special at one of them only is a singular position
 TRIES = 96  # guesses at a pose
 PRESENT = 1e-6  # of the largest entry of a null vector

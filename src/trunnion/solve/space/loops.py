@@ -46,8 +46,6 @@ from trunnion.solve.space.determinacy import look
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates
 from trunnion.solve.track import GUESSES, SEED, guess_reaches
 
-__all__ = ["CLOSED", "Ask", "End", "LeastPlay", "LinearLoops", "Loops", "Start", "ends_of", "least_play", "start_of"]
-
 Array = NDArray[np.float64]
 LARGEST = 0.3  # rad, or of the size: a coordinate goes no farther in one step
 ROUNDS = 60  # of least squares, to where the loops are open least

@@ -150,6 +150,18 @@ def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tm
     assert set(read.conditions[0].courses) == {name, "n1"}
 
 
+@pytest.mark.parametrize("speed", ["60 rpm", "-60 rpm"])
+def test_an_index_is_at_coordinate_0_whichever_way_the_shaft_turns(
+    mechanism: Mechanism, speed: str, tmp_path: Path
+) -> None:
+    changes = {"encoder": {"per_turn": 90, "index": "z"}, "set": {"A.speed": speed}, "rate": "5 kHz"}
+    seen = trunnion.rig.observe(mechanism, rig(sensors={"x": {"measures": "coupler.C.x"}}, **changes))
+    seen.write(tmp_path)
+    course = trunnion.rig.read(tmp_path / "mapping.yaml").conditions[0].courses["x"].mean
+    true = seen.measurement(len(course)).conditions[0].courses["x"].mean
+    assert course == pytest.approx(true, abs=1e-4 * np.ptp(true))
+
+
 def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     """The strip of the press rests two thirds of the cycle: no cell is empty, the course is read back."""
     press = trunnion.read(EXAMPLES / "indexing-press.yaml")

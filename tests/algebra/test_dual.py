@@ -192,7 +192,6 @@ def test_arrays_on_the_left():
         (np.float64(3.0) * x, 6.0, 9.0),
         (np.array([2.0, 3.0]) ** Dual(2.0, 1.0), [4.0, 9.0], [4 * math.log(2), 9 * math.log(3)]),
     ):
-        assert isinstance(found, Dual)
         np.testing.assert_allclose(found.real, real)
         np.testing.assert_allclose(
             np.broadcast_to(found.dual, np.shape(found.real)), np.broadcast_to(dual, np.shape(real))

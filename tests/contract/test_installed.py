@@ -97,7 +97,6 @@ def test_the_studio_is_served_without_node(installed, tmp_path):
     command = [sys.executable, "-m", "trunnion", "studio", "m.yaml", "--no-open", "--port", "0"]
     bare = {"PYTHONPATH": str(installed), "PATH": "", "HOME": str(tmp_path)}
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, env=bare) as process:
-        assert process.stdout is not None
         try:
             address = process.stdout.readline().split()[-1]
             with sync_playwright() as playwright:

@@ -67,11 +67,6 @@ def test_drivers_of_one_kind_have_one_unit_and_no_more_coordinates(driver, unit)
     assert not [name for name in result.coords if str(name).endswith("_unit")]
 
 
-def seated():
-    """The same with its pin at a place in its hole."""
-    return mixed("planar").with_values({"joints.C.seat": {"xi": 0.5}})
-
-
 def moving():
     data = excavator()
     data["drivers"]["S"] |= {"free": True}
@@ -86,7 +81,8 @@ STUDIES = {
     "cycle": (lambda: trunnion.analyse(mixed("planar"), 6), {
         "spring_force": ("spring", {"coil": "N", "torsion": "N m"}), "measure_value": ("measure", MEASURES),
         "spring_elongation": ("spring", {"coil": "m", "torsion": "rad"}), "measure_figure": ("measure", MEASURES)}),
-    "sweep": (lambda: trunnion.sweep(seated(), {"reach": [0.9, 0.91]}, steps=6), EFFORTS | {
+    "sweep": (lambda: trunnion.sweep(
+        mixed("planar").with_values({"joints.C.seat": {"xi": 0.5}}), {"reach": [0.9, 0.91]}, steps=6), EFFORTS | {
         "transmission_error_max": ("joint", {**dict.fromkeys("ABCK", "rad"), "S": "m"})}),
     "time": (lambda: trunnion.simulate(moving(), 0.02, steps=4), {
         "drive_effort": ("driver", MIXED), "drive_coordinate": ("driver", COORDINATES),

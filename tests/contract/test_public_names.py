@@ -11,12 +11,10 @@ from mechanisms import MODELS
 from trunnion.accessor import Accessor
 
 FUNCTIONS = {
-    **{name: getattr(trunnion, name) for name in trunnion.__all__ if inspect.isroutine(getattr(trunnion, name))},
-    **{
-        f"rig.{name}": getattr(trunnion.rig, name)
-        for name in trunnion.rig.__all__
-        if inspect.isroutine(getattr(trunnion.rig, name))
-    },
+    prefix + name: getattr(module, name)
+    for prefix, module in (("", trunnion), ("rig.", trunnion.rig))
+    for name in module.__all__
+    if inspect.isroutine(getattr(module, name))
 }
 # where a default is another for a reason
 OTHERWISE = {

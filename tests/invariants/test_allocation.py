@@ -38,7 +38,6 @@ def test_units(seed, criterion, length, money):
     own = rng.uniform(0.01, 100, (6, 1))
     parts = []
     for one in problem.contributions:
-        assert one.cost is not None
         given = one.cost.parameters
         cost = Cost(one.cost.model, {**given, "A": c * given["A"], "B": c * given["B"], "unit": a * given["unit"]})
         parts.append(replace(one, cost=cost, most=a * one.most))

@@ -144,7 +144,6 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction, close):
     """It is foreseen, told with its place and time, and reached in some hundred evaluations."""
     motion = FreeMotion.of(prepare(rocker(friction)))
     found = ActiveMotion(motion, Walks(motion), 2.0, 1e-9).run(initial_row(motion))
-    assert found.ended is not None
     assert found.ended.code == "simulate.dead_centre"
     assert found.ended.figures["coordinate"] == pytest.approx(np.arccos(-0.78125), abs=close)
     assert 0.0 < found.ended.time - found.end < 0.05 * found.end

@@ -50,7 +50,6 @@ def driven(driver, data=None, name="A", **options):
 )
 def test_peaks_are_the_published_factors(name, peak_rate, peak_second):
     law = PROFILES[name]
-    assert law.profile is not None
     _, rate, second = law.profile(np.linspace(0, 1, 100_001))
     assert np.max(rate) == pytest.approx(peak_rate, abs=6e-5)
     assert np.max(np.abs(second)) == pytest.approx(peak_second, abs=6e-5)
@@ -61,7 +60,6 @@ def test_peaks_are_the_published_factors(name, peak_rate, peak_second):
 @pytest.mark.parametrize("name", PROFILES)
 def test_a_profile_takes_nested_duals_and_is_smooth(name):
     profile = PROFILES[name].profile
-    assert profile is not None
     u = np.linspace(0.001, 0.999, 333)
     s, rate, second = profile(u)
     nested = profile(Dual(Dual(u, 1.0), Dual(1.0, 0.0))).value

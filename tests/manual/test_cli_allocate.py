@@ -12,9 +12,7 @@ import xarray as xr
 import trunnion
 from mechanisms_parts import EXAMPLES
 
-FOURBAR, GRADES, PISTON = (
-    EXAMPLES / f"{name}.yaml" for name in ("toleranced-fourbar", "fourbar-by-grades", "piston-by-cost")
-)
+FOURBAR, GRADES = EXAMPLES / "toleranced-fourbar.yaml", EXAMPLES / "fourbar-by-grades.yaml"
 QUICK = ("--steps", 24, "--samples", 100)
 
 

@@ -17,7 +17,7 @@ from trunnion.cycle.model_measures import NamedNumber, vocabulary
 from trunnion.errors import Finding, Severity
 from trunnion.views.cycle import PLOTS
 
-FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
+FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
 STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}
 LAW = ("--friction", "stribeck")
 SETTINGS = tuple(part for name, value in STRIBECK.items() for part in ("--set", f"{name}={value}"))

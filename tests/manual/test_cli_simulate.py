@@ -58,7 +58,7 @@ def test_the_command_line_tells_where_a_motion_ends(program, tmp_path):
     assert "A reaches 114.6°, the end of its stated range" in err
 
 
-DRAWING, FREE = EXAMPLES / "drawing-press.yaml", EXAMPLES / "durango-fourbar.yaml"
+FREE = EXAMPLES / "durango-fourbar.yaml"
 
 
 def test_without_friction_the_ranges_are_those_of_coefficients_of_zero(program):

@@ -8,7 +8,7 @@ import pytest
 import trunnion
 from mechanisms import MODELS, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
-from mechanisms_space import Drawn, rssr
+from mechanisms_space import rssr
 from reference.maximal_space import Drive, Frame, Linkage, element, point, pose_of, published, rotation
 from reference.seat_oracle import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS
@@ -160,7 +160,6 @@ def offsets_for(space, data, size, seed):
 def test_mechanisms_in_space_with_offsets_in_every_joint(name):
     """Frames of all links against maximal coordinates, to 1e-10: offsets up to 1 mm, bearings off their points."""
     drawn = SPACE_MODELS[name]()
-    assert isinstance(drawn, Drawn)
     seats = offsets_for("spatial", drawn.data, 1e-3, seed=4)
     assert seats
     run = prepare(trunnion.Mechanism(trunnion=1, **drawn.data))

@@ -29,9 +29,7 @@ def hoist(friction=FRICTION):
 
 
 def course(mechanism):
-    found = locking_course(prepare(mechanism), FrictionMethod(margin_up_to=MARGIN))
-    assert found is not None
-    return found
+    return locking_course(prepare(mechanism), FrictionMethod(margin_up_to=MARGIN))
 
 
 def states(found):

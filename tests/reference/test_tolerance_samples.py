@@ -215,7 +215,6 @@ def test_sobol_points():
     assert result["samples"].item() == 8 * 512
     u = np.array([sobol(4, i, 4, 0, 512) for i in range(8)])
     turn = study(mechanism).sampling("quasi-monte-carlo", 5000, 4).rotation
-    assert turn is not None
     assert turn @ turn.T == pytest.approx(np.eye(4), abs=1e-14)
     gradient = np.array([13.654, -13.401, -15.623, 6.323])
     assert abs(turn[:, 0] @ gradient) == pytest.approx(np.linalg.norm(gradient), rel=1e-6)

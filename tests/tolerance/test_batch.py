@@ -102,7 +102,6 @@ def test_workers_end_with_a_main_process_that_is_killed(tmp_path):
         "if __name__ == '__main__':\n    run(ToyJob(blocks=4000, pause=0.02), jobs=2, progress=tell)\n"
     )
     with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as program:
-        assert program.stdout is not None
         workers = [int(word) for word in program.stdout.readline().split()]
         program.kill()
     assert workers

@@ -154,8 +154,7 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
 
 def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     """Ends of the shaded ranges are those found between the positions."""
-    found = trunnion.locking(trunnion.Mechanism.model_validate(HOIST), STEPS)
-    upper = plot(found, "locking").axes[0]
+    upper = plot(trunnion.locking(trunnion.Mechanism.model_validate(HOIST), STEPS), "locking").axes[0]
     spans = {patch.get_label(): patch for patch in upper.patches}
     limit = np.degrees(np.arccos(0.3))
     held = spans[LockingState.SELF_LOCKING_FORWARD.text]

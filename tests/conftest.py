@@ -69,7 +69,9 @@ def pytest_collection_modifyitems(config, items):
     left = []
     for (_, count, *also), found in _marked(items, "spread").items():
         kept = _evenly(count, len(found))
-        others = [item for k, item in enumerate(found) if k not in kept and _case(item) not in also]
+        others = [
+            item for k, item in enumerate(found) if k not in kept and item.nodeid.partition("[")[2][:-1] not in also
+        ]
         for item in others:
             item.add_marker(pytest.mark.slow)
         if not found[0].get_closest_marker("sample"):
@@ -80,11 +82,6 @@ def pytest_collection_modifyitems(config, items):
         out = set(map(id, left))
         items[:] = [item for item in items if id(item) not in out]
         config.hook.pytest_deselected(items=left)
-
-
-def _case(item):
-    """The case of a test: what stands in brackets behind its name."""
-    return item.nodeid.partition("[")[2].removesuffix("]")
 
 
 def _but_evenly(count, items):

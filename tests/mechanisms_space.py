@@ -38,24 +38,18 @@ def frame_of(place: Any, axes: Any = None) -> Frame:
 def pair_motion(kind: str, rng: np.random.Generator, pitch: float) -> tuple[Frame, float]:
     """A random relative motion of a pair, and its coordinate."""
     turn, slide = rng.uniform(-2.5, 2.5), rng.uniform(0.1, 0.4)
-    about = rotation([0, 0, 1], turn)
-    along = np.array([0, 0, slide])
-    if kind == "revolute":
-        return frame_of(np.zeros(3), about), turn
-    if kind == "prismatic":
-        return frame_of(along), slide
-    if kind == "cylindrical":
-        return frame_of(along, about), turn
-    if kind == "helical":
-        return frame_of([0, 0, pitch * turn / (2 * np.pi)], about), turn
-    if kind == "universal":
-        second = rotation([0, 0, 1], rng.uniform(-2.5, 2.5))
-        return frame_of(np.zeros(3), about @ rotation([1, 0, 0], np.pi / 2) @ second), 0.0
-    if kind == "planar":
-        return frame_of([*rng.uniform(-0.2, 0.2, 2), 0], about), 0.0
-    if kind == "fixed":
-        return frame_of(np.zeros(3)), 0.0
-    return frame_of(np.zeros(3), random_rotation(rng)), 0.0
+    about, tilt = rotation([0, 0, 1], turn), rotation([1, 0, 0], np.pi / 2)
+    place, axes, coordinate = {
+        "revolute": lambda: ([0, 0, 0], about, turn),
+        "prismatic": lambda: ([0, 0, slide], None, slide),
+        "cylindrical": lambda: ([0, 0, slide], about, turn),
+        "helical": lambda: ([0, 0, pitch * turn / (2 * np.pi)], about, turn),
+        "universal": lambda: ([0, 0, 0], about @ tilt @ rotation([0, 0, 1], rng.uniform(-2.5, 2.5)), 0.0),
+        "planar": lambda: ([*rng.uniform(-0.2, 0.2, 2), 0], about, 0.0),
+        "fixed": lambda: ([0, 0, 0], None, 0.0),
+        "spherical": lambda: ([0, 0, 0], random_rotation(rng), 0.0),
+    }[kind]()
+    return frame_of(place, axes), coordinate
 
 
 def body(rng: np.random.Generator, size: float = 0.4) -> Data:
@@ -111,9 +105,9 @@ def _drawn(seed: int, chains: str, drivers: tuple[str, ...]) -> Drawn:
             links[link] |= rod(one, two)
             links[link]["points"]["grip"] = list(one + 0.3 * (two - one))
             rods.append(link)
-    loads: Data = {}
-    for link in names:
-        loads[f"push-{link}"] = {"link": link, "at": "grip", "force": list(rng.uniform(-20, 20, 3))}
+    loads: Data = {
+        f"push-{link}": {"link": link, "at": "grip", "force": list(rng.uniform(-20, 20, 3))} for link in names
+    }
     loads["twist"] = {
         "link": [link for link in names if link not in rods][-1],
         "moment": list(rng.uniform(-5, 5, 3)),
@@ -327,13 +321,7 @@ def floating(nut: str) -> tuple[Data, Data]:
         "plate": {"points": {"X": x, "Y": y}},
         "ring": {"points": {"Y": y, "U": x}},
     }
-    joints = {
-        "P": {"type": "prismatic", "links": ["ground", "carriage"]},
-        "X": {"type": "prismatic", "links": ["carriage", "plate"]},
-        "Y": {"type": "prismatic", "links": ["plate", "ring"]},
-        "U": {"type": "universal", "links": ["ring", nut]},
-    }
-    return links, joints
+    return links, joined(f"ground =P= carriage =X= plate =Y= ring -U:universal- {nut}")
 
 
 CARDANS: dict[str, Data] = {

@@ -12,7 +12,7 @@ def wheel(motor: dict[str, Any] | None = None, drag: float = 0.6, grease: float 
     """A flywheel of 0.05 kg m² on a shaft, with a constant and a viscous loss."""
     return Mechanism(
         links={"ground": {"points": {"A": [0, 0]}}, "wheel": {"points": {"A": [0, 0]}, "inertia": 0.05}},
-        joints={"A": {"type": "revolute", "links": ["ground", "wheel"]}},
+        joints=joined("ground -A- wheel"),
         drivers={"A": {"speed": 100, **({"motor": motor} if motor else {"free": True}), **driver}},
         loads={"drag": {"joint": "A", "resisting_torque": drag}} if drag else {},
         springs={"grease": {"joint": "A", "damping": grease}} if grease else {},
@@ -37,10 +37,6 @@ def three_posts() -> Mechanism:
     def link(first: str, *last: str) -> dict[str, Any]:
         return {"points": {first: [0, 0], **{key: [1, 0] for key in last}}, **rod}
 
-    ends = {
-        "A0": ["ground", "p1"], "B0": ["ground", "p2"], "C0": ["ground", "p3"],
-        "A": ["p1", "c1"], "B": ["c1", "p2"], "B2": ["p2", "c2"], "C": ["c2", "p3"],
-    }  # fmt: skip
     return Mechanism(
         gravity=[0, -9.81],
         links={
@@ -48,7 +44,7 @@ def three_posts() -> Mechanism:
             "p1": link("A0", "A"), "p2": link("B0", "B", "B2"), "p3": link("C0", "C"),
             "c1": link("A", "B"), "c2": link("B2", "C"),
         },
-        joints={name: {"type": "revolute", "links": links} for name, links in ends.items()},
+        joints=joined("ground -A0- p1 -A- c1 -B- p2 -B2- c2 -C- p3, ground -B0- p2, ground -C0- p3"),
         drivers={"A0": {"speed": 1, "start": np.pi / 2, "free": True, "initial": {"speed": -1}}},
         assembly={"B": [1, 1], "C": [2, 1]},
     )  # fmt: skip
@@ -143,8 +139,7 @@ def driven_four_bar(space: str, sides: tuple[float, float, float, float], at: li
 
     begin: dict[str, Any] = {"initial": {"coordinate": 1.0}} if "range" in driver else {"start": 1.0}
     ground = {"A": [0, 0], "D": [d, 0]}
-    kinds = ["revolute"] * 4 if flat else ["revolute", "spherical", "cylindrical", "revolute"]
-    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
+    ball, tube = ("", "") if flat else (":spherical", ":cylindrical")
     return Mechanism(
         space=space,
         gravity=[0, 0] if flat else [0, 0, 0],
@@ -152,7 +147,7 @@ def driven_four_bar(space: str, sides: tuple[float, float, float, float], at: li
             "ground": {"points": ground if flat else {key: in_space(place) for key, place in ground.items()}},
             "crank": link(a, "A", "B"), "coupler": link(b, "B", "C"), "rocker": link(c, "D", "C"),
         },
-        joints={name: {"type": kind, "links": links} for kind, (name, links) in zip(kinds, ends.items(), strict=True)},
+        joints=joined(f"ground -A- crank -B{ball}- coupler -C{tube}- rocker, ground -D- rocker"),
         drivers={"A": {"speed": 1, "motor": TORQUE, **begin, **driver}},
         assembly={"C": at if flat else [*at, 0]},
     )  # fmt: skip

@@ -38,8 +38,6 @@ def interrupted(folder: Path, jobs: int) -> tuple[list[str], str]:
     with subprocess.Popen(
         command, stdout=pipe, stderr=pipe, text=True, env=ENVIRONMENT, start_new_session=True
     ) as program:
-        assert program.stdout is not None
-        assert program.stderr is not None
         lines = [program.stdout.readline().strip() for _ in range(8)]
         time.sleep(0.1)
         os.killpg(program.pid, signal.SIGINT)  # as a terminal does it: to the workers too

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from mechanisms_parts import joined
 from mechanisms_space import chain
 from trunnion import MechanismError
 from trunnion.cycle.positions import positions
@@ -25,10 +26,7 @@ PLANAR = {
               "crank": {"points": {"A": [0, 0], "B": ["40 mm", 0]}, "mass": 1},
               "rod": {"points": {"B": [0, 0], "C": ["0.15 m", 0]}, "mass": 1},
               "slider": {"points": {"C": [0, "10 mm"], "D": {"at": [0, 0], "axis": [1, 0]}}, "mass": 2}},
-    "joints": {"A": {"type": "revolute", "links": ["ground", "crank"]},
-               "B": {"type": "revolute", "links": ["crank", "rod"]},
-               "C": {"type": "revolute", "links": ["rod", "slider"]},
-               "D": {"type": "prismatic", "links": ["ground", "slider"]}},
+    "joints": joined("ground -A- crank -B- rod -C- slider, ground =D= slider"),
     "drivers": {"A": {"speed": "60 rpm", "start": "20 deg"}},
     "loads": {"work": {"link": "slider", "at": "D", "force": ["-500 N", 0]}},
     "assembly": {"C": ["0.19 m", "10 mm"]},
@@ -57,12 +55,6 @@ BASES = [  # beside what the key is stated: alone, with friction, with a play, w
     {"misalignment": {"tilt": "0.1 deg", "offset": "0.1 mm"}},
     {"misalignment": {"offset": "0.1 mm"}},
 ]  # fmt: skip
-
-
-def samples():
-    found = [pytest.param("spatial", kind, key, id=f"spatial-{kind}-{key}") for kind in PAIRS for key in VALUES]
-    flat = [kind for kind in PAIRS if PAIRS[kind].planar]
-    return found + [pytest.param("planar", kind, key, id=f"planar-{kind}-{key}") for kind in flat for key in VALUES]
 
 
 def test_every_key_is_tried():
@@ -113,7 +105,11 @@ def figures(mechanism):
 
 @pytest.mark.sample(80)
 @pytest.mark.slow
-@pytest.mark.parametrize(("space", "kind", "key"), samples())
+@pytest.mark.parametrize("key", VALUES)
+@pytest.mark.parametrize(
+    ("space", "kind"),
+    [("spatial", kind) for kind in PAIRS] + [("planar", kind) for kind in PAIRS if PAIRS[kind].planar],
+)
 def test_a_key_changes_something_or_is_told(space, kind, key, bare):
     data = bare[space, kind]
     joint = ("D" if kind == "prismatic" else "B") if space == "planar" else "B"

@@ -224,7 +224,7 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share):
 
 def test_a_short_range_ends_where_the_loads_cease_to_push():
     """Backward, by what acts on it: the end of a range need not lie next to a position that anything asked for."""
-    found = course(Mechanism.example("double-butterfly"))
+    found = course(example("double-butterfly"))
     (part,) = [
         part for part in found.ranges() if part.state == LockingState.SELF_LOCKING and part.places[0] == "74.55°"
     ]

@@ -6,7 +6,7 @@ import pytest
 import trunnion
 from brief import brief
 from mechanisms import MODELS, build, model
-from mechanisms_parts import joined
+from mechanisms_parts import example, joined
 from mechanisms_space import cardan, rssr
 from reference.maximal_space import raised
 from reference.test_space_values import loop
@@ -112,7 +112,7 @@ def test_friction_that_drags_a_rod_round(turned):
 
     Whichever link of a ball is named first: here by the turns of the links themselves, over the same positions.
     """
-    data = trunnion.Mechanism.example("rssr").data()
+    data = example("rssr").data()
     for joint in turned:
         data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
     run = prepare(trunnion.Mechanism(**data))

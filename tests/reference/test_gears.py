@@ -10,6 +10,7 @@ from brief import brief, judged
 from mechanisms import analyse, geared_five_bar, geared_loop, planet_drive, positions_of, rocker_train, screwed_strut
 from mechanisms_parts import corner, joined, slide
 from trunnion import Mechanism, Status
+from trunnion.results.attributes import findings_of
 from trunnion.solve.run import prepare
 
 TOOTHED = {"five-bar": geared_five_bar, "planet": planet_drive, "loop": geared_loop}
@@ -197,6 +198,18 @@ def test_chain_hoist():
     rough = trunnion.analyse(Mechanism(**hoist(pin={"radius": 0.01}, friction=0.1)), 5)
     np.testing.assert_allclose(at(rough, "drive_effort", driver="A"), weight * (0.06 + 0.1 * 0.01), rtol=1e-12)
     assert float(rough["efficiency"]) == pytest.approx(0.06 / 0.061, rel=1e-12)
+
+
+@pytest.mark.parametrize("lift", [0.0, 900.0, 2000.0])
+def test_a_rope_that_would_push_is_named_with_its_force(lift):
+    """m g − F sin of the angle, closed form."""
+    force = {"link": "load", "at": "S", "force": [0, f"{lift} N * sin(drive)"]}
+    result = trunnion.analyse(Mechanism(**hoist() | {"loads": {"lift": force}}), 7)
+    slack = [found.figures for found in findings_of(result) if found.code == "gears.slack"]
+    assert len(slack) == (lift > 100.0 * 9.81)
+    for figures in slack:
+        ends = sorted(abs(figures[end]) for end in ("lower", "upper"))
+        np.testing.assert_allclose(ends, [lift - 981.0, lift + 981.0], rtol=1e-9)
 
 
 def test_a_falling_load_turns_its_wheel():

@@ -7,7 +7,7 @@ positions without an answer are those of the positions (`causes`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.dual import primal
-from trunnion.cycle.course import CycleCourse, Means
+from trunnion.algebra.dual import primal, single
+from trunnion.cycle.course import CycleCourse, Means, course_of
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
@@ -374,6 +374,25 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
             yield Finding.warning("spring.never_acts", where, what, free=free, nearest=nearest)
 
 
+def _slack(cycle: Cycle) -> Iterator[Finding]:
+    """Ropes and chains whose force changes its sign: which way they pull is not stated, but a rope cannot push."""
+    ropes = [name for name, gear in cycle.mechanism.gears.items() if gear.radius is not None and not gear.teeth]
+    if not ropes or cycle.course is None:
+        return
+    course = course_of(cycle.run, replace(cycle.at.method, margin_up_to=0.0), names=("gear_torque",))
+    least_force = scales_of(cycle.run).floor("N")
+    for name in ropes:
+        row, radius = list(cycle.mechanism.gears).index(name), single(cycle.run.values[f"gears.{name}.radius"])
+        ends = [course.extreme("gear_torque", row, sign=sign, unit="N m") for sign in (-1.0, 1.0)]
+        low, high = (0.0 if top is None else top.value / abs(radius) for top in ends)
+        if low < -least_force and high > least_force:
+            places = " and ".join(course.told(top) for top in ends if top is not None)
+            what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; a rope goes "
+            what += "slack where it would push"
+            remedy = "a closed chain or belt bears both ways; a rope needs a load or a speed that keep it taut"
+            yield Finding.note("gears.slack", f"gears.{name}", what, remedy, lower=low, upper=high)
+
+
 def beside_the_drive(mechanism: Mechanism) -> list[str]:
     """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
     useful = useful_loads(mechanism)
@@ -512,5 +531,5 @@ def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[fl
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
     _not_assembled, _without_answer, _locked, _resting, _ranges, _no_common_period, _rough, _driving_resistances,
-    _springs, _uncounted_work, _lost_contacts,
+    _springs, _slack, _uncounted_work, _lost_contacts,
 )  # fmt: skip

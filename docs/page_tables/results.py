@@ -67,7 +67,7 @@ def _unit(variable: Any) -> str:
 
 def sweeps_table() -> str:
     """Every figure of a sweep."""
-    from trunnion.studies.sweep import FIGURES
+    from trunnion.studies.sweep_grid import FIGURES
 
     return _described("dimension before the swept ones", FIGURES)
 

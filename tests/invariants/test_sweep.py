@@ -12,7 +12,8 @@ from manual.conftest import Run, program  # noqa: F401
 from mechanisms_parts import EXAMPLES, example
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.studies.sweep import FIGURES, Points
+from trunnion.studies.sweep import Points
+from trunnion.studies.sweep_grid import FIGURES
 from trunnion.studies.sweep_grid import grid as grid_of
 
 CARDAN = EXAMPLES / "pezzuti-cardan.yaml"

@@ -8,8 +8,8 @@ import trunnion
 from mechanisms import eccentric_press
 from mechanisms_parts import example, joined, plunger
 from trunnion import Mechanism, Status
-from trunnion.cycle.locking import LockingState, locking, look, report_figures
-from trunnion.cycle.locking_course import NO_MARGIN, locking_course, passed
+from trunnion.cycle.locking import locking, look, report_figures
+from trunnion.cycle.locking_course import NO_MARGIN, LockingState, locking_course, passed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import prepare

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from trunnion.results.dataset import MemberUnits, described, with_variables
-from trunnion.studies.sweep import FIGURES
+from trunnion.studies.sweep_grid import FIGURES
 
 RPM, DEG = np.pi / 30, np.pi / 180
 UNITS = {

@@ -9,7 +9,7 @@ from stand_in import four_bar, slider
 import trunnion
 from drawn import line
 from mechanisms_parts import example, joined
-from trunnion.cycle.locking import LockingState
+from trunnion.cycle.locking_course import LockingState
 from trunnion.errors import MechanismError, Status
 from trunnion.views.axis import abscissa
 from trunnion.views.cycle import PLOTS, READY, mechanism

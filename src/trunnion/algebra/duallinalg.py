@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual
 
-__all__ = ["EQUAL", "Eigen", "eigh", "inverse", "solve"]
-
 Array = NDArray[np.float64]
 
 EQUAL = 1e-13  # of the largest: eigenvalues closer than that are taken for equal

@@ -39,11 +39,6 @@ from trunnion.algebra.vector import (
     where,
 )
 
-__all__ = [
-    "PARALLEL", "Perpendicular", "adjoint", "angle_about", "dual_angle", "exp", "frame", "line", "link", "log",
-    "perpendicular", "pose", "reciprocal", "rotation_and_point", "turn_x", "turn_z",
-]  # fmt: skip
-
 PARALLEL = 1e-12  # of |sin θ|: the perpendicular then holds 4 digits, as rounding of the cross product is 1e-16
 SMALL = 0.25  # θ² below which sin θ/θ and (1 − cos θ)/θ² are summed: eight terms leave 1e-16
 SMALL_SINE = 0.01  # sin²(θ/2) below which the angle over its sine is summed: eight terms leave 1e-17

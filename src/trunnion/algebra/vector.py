@@ -14,11 +14,6 @@ from trunnion.algebra import literal
 from trunnion.algebra.dual import parts, primal, spatial
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = [
-    "IDENTITY", "Matrix3", "Vector3", "apply", "cross", "divided", "dot", "length", "minus", "plus", "product",
-    "scaled", "skew", "spatial_vector", "transpose", "unit", "vector_parts", "where",
-]  # fmt: skip
-
 Vector3 = tuple[Number, Number, Number]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["allocate", "assemble", "play", "tolerance"]
-
 
 @verb(
     lacks="table friction seat columns",

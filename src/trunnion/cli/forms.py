@@ -12,8 +12,6 @@ from trunnion.cli.measured import compare, identify
 from trunnion.cli.motion import design, locking, simulate, sweep
 from trunnion.cli.options import options_of, types_in
 
-__all__ = ["forms"]
-
 STUDIES = (locking, design, play, tolerance, allocate, simulate, sweep, assemble, compare, identify)
 # what the studio sets itself, and options that read a file or concern files and processes
 LEFT_OUT = {

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["compare", "data", "estimated", "identify", "rig"]
-
-
 FEWEST = 20  # conditions from which a progress bar is worth it
 MOST_COMPARED, MOST_IDENTIFIED = 40, 24  # rows of the tables that are printed
 

@@ -18,8 +18,6 @@ from trunnion.files import folder, whole
 if TYPE_CHECKING:
     from trunnion.cycle.model_measures import NamedMeasure, NamedNumber
 
-__all__ = ["check", "examples", "export", "import_", "schema", "studio"]
-
 HEAD = ["name", "value", "unit"]
 
 

@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from trunnion.results.dataset import Result
     from trunnion.solve.friction_method import FrictionMethod
 
-__all__ = ["analyse", "design", "locking", "plot", "report", "simulate", "sweep"]
-
 
 @verb(out=DATA, at=ONE_POSITION)
 def analyse(

@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
     from trunnion.solve.friction_method import FrictionMethod
 
-__all__ = [
-    "CURVES", "DATA", "IMAGES", "ONE_POSITION", "OPTIONS", "PLOT_KINDS", "WRITTEN", "Files", "Friction", "Model",
-    "named_file", "options_of", "over", "placed", "points", "seconds", "setting", "share", "types_in", "verb",
-]  # fmt: skip
-
 IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
 PLOT_KINDS = (
     "torque, speed, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta, locking or measures"

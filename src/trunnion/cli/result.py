@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from trunnion.results.attributes import Figure
     from trunnion.results.dataset import Result
 
-__all__ = ["PAGES", "YAML", "Shown", "bar", "check_files", "check_model", "check_target", "end", "exit_status", "line",
-           "say", "show_figures", "show_rows", "show_tables", "write_text", "wrote"]  # fmt: skip
-
 PAGES = (".html", ".htm")  # a report is HTML
 YAML, MODELS = (".yaml", ".yml"), (".yaml", ".yml", ".json")
 # notes that nearly every result has: they are left to the report and to `check`

@@ -26,8 +26,6 @@ from trunnion.solve.run import prepare
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["analyse", "analysed", "drawable"]
-
 DRAWN = 72  # positions of the curves of points that are drawn
 
 

@@ -35,11 +35,6 @@ from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import MARGINS, SEATED
 from trunnion.solve.system import System
 
-__all__ = [
-    "MOST_SUPPOSED", "CycleCourse", "Mean", "Means", "course_of", "followed", "like", "magnitude", "margin_of",
-    "margin_rows", "stacked", "unknown",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
 FORCES = ("drive_effort", "reaction_force", "reaction_moment", "end_load", "gear_torque", "drive_effort_change")

@@ -25,8 +25,6 @@ from trunnion.solve.switches import MARGINS, Mechanisms, accuracy_of, bends, bre
 from trunnion.solve.system import Values
 from trunnion.solve.walk_kernel import Figure, Lanes, WalkKernel, lanes_of, literals, time_of
 
-__all__ = ["CycleKernel", "Engine", "Many", "compiles", "kernel_of"]
-
 Cell = tuple[str, tuple[int, ...]]  # variable, and place in its array but for the position
 
 Engine = Literal["auto", "numpy", "compiled"]

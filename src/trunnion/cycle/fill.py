@@ -30,11 +30,6 @@ from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.switches import unwrap_row
 from trunnion.solve.system import Positions, System, Values, sticking
 
-__all__ = [
-    "COMPARED", "CONDITIONS", "Arrays", "Causes", "Cell", "allocate", "blank", "cells", "fill_chunk", "fill_errors",
-    "labels", "pin_area", "unwrap",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Arrays = dict[str, Array]
 Vector = Sequence[Number]

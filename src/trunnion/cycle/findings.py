@@ -34,8 +34,6 @@ from trunnion.solve.system import System, felt, rubbing
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed", "of_run"]
-
 Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 CLASS_TWO = 2

@@ -20,8 +20,6 @@ from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import prepare
 from trunnion.structure.decompose import Plan, mobility_by_rank
 
-__all__ = ["Check", "check"]
-
 
 @dataclass(frozen=True)
 class Check:

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trunnion.cycle.locking_course import (
-    HELD_AND_DRIVEN,
     NEAR,
-    LockingRange,
     LockingState,
     critical_multiples,
     holding_multiples,
@@ -36,11 +34,6 @@ from trunnion.solve.system import Values, felt, rubbing, scale_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "HELD_AND_DRIVEN", "MOST_STEPS", "NEAR", "LockingRange", "LockingState", "locking", "locks_of", "look",
-    "margins_without", "report_figures",
-]  # fmt: skip
 
 Array = NDArray[np.float64]
 

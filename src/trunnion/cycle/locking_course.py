@@ -39,12 +39,6 @@ from trunnion.solve.system import felt, law_of, scale_of
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = [
-    "HEAD", "HELD_AND_DRIVEN", "NEAR", "NO_MARGIN", "LockingCourse", "LockingRange", "LockingState", "Passage",
-    "critical_figure", "critical_multiples", "holding_multiples", "least_margin", "locking_course",
-    "multiples_at", "passed",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
 HEAD = ("state", "from", "to", "smallest margin", "at")  # of the table of ranges

@@ -31,8 +31,6 @@ from trunnion.solve.switches import unwrap_row
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "NamedMeasure", "NamedNumber", "Vocabulary", "Watched", "vocabulary", "watched"]
-
 Array = NDArray[np.float64]
 VARIABLES = {
     "measure_value": Variable(

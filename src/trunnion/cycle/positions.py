@@ -25,9 +25,6 @@ from trunnion.solve.run import CHUNK, Run, blocks
 from trunnion.solve.seating import NO_LOAD, SETTLED, UNSETTLED, Seating, seating_of
 from trunnion.solve.system import Dial, System
 
-__all__ = ["ALL", "Arrays", "Dtype", "Kept", "Positions", "check_steps", "positions", "stretch"]
-
-
 Array = NDArray[np.float64]
 Dtype = Literal["float64", "float32"]
 INSIDE = 1e-9  # of the cycle: positions at the ends of a time belong to it

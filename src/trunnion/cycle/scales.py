@@ -13,8 +13,6 @@ from trunnion.errors import Status
 from trunnion.results.dataset import Scales, powers_of
 from trunnion.solve.run import Run
 
-__all__ = ["largest", "peak", "scales_of"]
-
 CANCELLED = 1e-4  # of what masses and springs may exert: the least that counts as a force beside their rounding
 LOOKED = 24  # positions: the scales are orders of magnitude
 

@@ -16,8 +16,6 @@ from trunnion.solve.run import Run
 from trunnion.solve.shifts import hole, play_of
 from trunnion.solve.system import System, Values, rubbing
 
-__all__ = ["load_courses", "pitch_circles", "scene_of"]
-
 DRAWN = 360  # positions at which a load that varies is looked at for the drawing
 COURSE = 3600  # positions up to which it is drawn as it is at each of them
 

@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 
     from trunnion.solve.run import Run
 
-__all__ = ["inputs", "member_units", "references", "result_of"]
-
-
 Arrays = Mapping[str, NDArray[np.float64]]
 ALIKE = 1e-9  # sizes of errors that are equal
 

@@ -32,8 +32,6 @@ from trunnion.dynamics.solution import CLOSE, Ended, Impact, Solution, Stretch, 
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset, least_clearance
 
-__all__ = ["ActiveMotion"]
-
 Array = NDArray[np.float64]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 

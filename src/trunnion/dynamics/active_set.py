@@ -21,8 +21,6 @@ from trunnion.dynamics.rates import kinetic_energy
 from trunnion.dynamics.state import Accelerated, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
-__all__ = ["IDLE", "MEET", "SLACK", "ActiveSet", "RowMode", "RowModes", "settled"]
-
 Array = NDArray[np.float64]
 RowMode = int | None  # of a row: 0 it holds, +1 or −1 it slips in that sense, None it is open
 RowModes = tuple[RowMode, ...]

@@ -17,8 +17,6 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RANK", "least_shares", "nearest", "newton_step"]
-
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 

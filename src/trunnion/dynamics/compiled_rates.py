@@ -32,8 +32,6 @@ from trunnion.solve.walk_kernel import literals
 if TYPE_CHECKING:
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = ["Codes", "CompiledRates", "rates_of"]
-
 Array = NDArray[np.float64]
 
 ROUNDS = 5  # of Newton's method in a program

@@ -23,10 +23,6 @@ from trunnion.results.quantities import readable
 from trunnion.solve.run import Run
 from trunnion.solve.track import TOUCHING
 
-__all__ = [
-    "check_start", "motion_findings", "refuse", "refuse_massless", "refuse_undetermined", "stated_drivers", "undefined",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none

@@ -21,8 +21,6 @@ from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.run import Run
 from trunnion.solve.track import Track
 
-__all__ = ["Followed", "Snapshot", "follows"]
-
 
 @dataclass(frozen=True)
 class Snapshot:

@@ -23,8 +23,6 @@ from trunnion.errors import Status
 from trunnion.solve.backward import NEAR_SINGULAR, pose_status
 from trunnion.solve.change_points import touched
 
-__all__ = ["Crossing", "Guards", "dead_centre", "first_crossing"]
-
 Array = NDArray[np.float64]
 
 LOOKS = 12  # parts of a step at whose ends one looks

@@ -34,8 +34,6 @@ from trunnion.dynamics.start import Places, load_times
 from trunnion.dynamics.state import FreeMotion, Linear, Mode, Moment
 from trunnion.dynamics.touching import Closed, Onset, least_clearance
 
-__all__ = ["OPEN", "STICK", "ImpactMotion", "Struck", "integration_of", "strike"]
-
 Array = NDArray[np.float64]
 
 OPEN, STICK = None, 0

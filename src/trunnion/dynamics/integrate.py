@@ -30,8 +30,6 @@ from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
 from trunnion.solve.backward import pose_status
 
-__all__ = ["FINEST", "MOST_EVALUATIONS", "Integration"]
-
 Array = NDArray[np.float64]
 
 FINEST = 3e-14  # the least relative tolerance of SciPy's integrators

@@ -32,11 +32,6 @@ from trunnion.results.quantities import readable
 from trunnion.solve.run import Run
 from trunnion.solve.system import Values
 
-__all__ = [
-    "FIGURES", "LONGER", "DriveCourse", "MotionKernel", "courses_in_time", "figures_in_time", "not_steady",
-    "numbers_in_time", "steady_figures",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 FIGURES = ("starting_time", "steady_speed", "fluctuation", "peak_effort")

@@ -13,8 +13,6 @@ from trunnion.joints.motors import transmitted
 from trunnion.model.parts import Motor
 from trunnion.solve.system import System, Values
 
-__all__ = ["Drive", "applied_to", "drives", "switched"]
-
 Array = NDArray[np.float64]
 
 CARRIED = Motor(kind="constant")  # stands for what comes through a clutch that slips

@@ -39,8 +39,6 @@ from trunnion.solve.run import Run
 from trunnion.structure.decompose import decompose, mobility_by_formula
 from trunnion.structure.passive import passive
 
-__all__ = ["Opened", "in_play", "of_several", "opened"]
-
 Array = NDArray[np.float64]
 
 

@@ -18,11 +18,6 @@ from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.system import felt, law_of, law_parameters
 from trunnion.solve.track import carried_on
 
-__all__ = [
-    "CLUTCH", "CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seen", "Walks", "beside", "bridged",
-    "kinetic_energy", "potential_energy", "seen",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 

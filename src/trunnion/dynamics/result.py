@@ -44,8 +44,6 @@ from trunnion.solve.run import CHUNK, Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOTION", "Books", "Found", "filled", "result_of", "spectrum"]
-
 Array = NDArray[np.float64]
 Touched = Sequence[tuple[ContactState, Push]]
 

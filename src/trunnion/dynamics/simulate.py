@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
     from trunnion.results.dataset import Result
 
-__all__ = ["Continued", "simulate", "simulated"]
-
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000

@@ -15,8 +15,6 @@ from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import Mode, Moment
 
-__all__ = ["CLOSE", "Ended", "Event", "Impact", "Solution", "Stretch", "over_steps", "step_nodes"]
-
 Array = NDArray[np.float64]
 
 CLOSE = 1e-13  # of the time or coordinate: places that are one

@@ -13,8 +13,6 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
 
-__all__ = ["CYCLES", "Places", "initial_row", "load_times", "places"]
-
 Array = NDArray[np.float64]
 
 SCANNED = 4001  # times at which ends of loads are looked for: most are linear in the time, and found exactly

@@ -31,8 +31,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.system import System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["NONE", "Accelerated", "FreeMotion", "Held", "Linear", "Mode", "Moment", "repeated"]
-
 Array = NDArray[np.float64]
 Senses = dict[str, Sense]  # by joint
 Pattern = dict[str, tuple[int, Sense]]  # by joint, see `FreeMotion.pattern`

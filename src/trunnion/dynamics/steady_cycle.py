@@ -41,8 +41,6 @@ from trunnion.results.dataset import Result, scales_in
 from trunnion.results.quantities import readable
 from trunnion.solve.run import prepare
 
-__all__ = ["Repeated", "UnsteadyError", "steady"]
-
 Array = NDArray[np.float64]
 
 

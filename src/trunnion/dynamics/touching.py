@@ -37,11 +37,6 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import law_parameters
 
-__all__ = [
-    "Closed", "Contact", "ContactState", "DiscContact", "EdgeContact", "Onset", "PinContact", "Push", "ShoulderContact",
-    "actions_of", "contacts_of", "least_clearance", "pushes_of",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 Vector = tuple[Number, ...]

@@ -22,8 +22,6 @@ from scipy.interpolate import BSpline
 
 from trunnion.exchange.draft import Array, Place, few, perpendicular, refused, steiner
 
-__all__ = ["Face", "Geometry", "Part21", "Ref", "Solid", "mass_of", "moments_of", "moved", "quoted"]
-
 LARGEST = 400_000  # entities of a file that is read; an assembly of a hundred parts has about half of it
 
 _START = re.compile(r"#(\d+)\s*+=\s*+")

@@ -28,10 +28,6 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["MATERIALS", "Array", "Body", "Draft", "ImportOptions", "Pair", "Place", "Positions", "components", "few",
-           "free_name", "moved", "perpendicular", "positions_of", "printable", "refused", "steiner",
-           "united"]  # fmt: skip
-
 Array = NDArray[np.float64]
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
              "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip

@@ -32,8 +32,6 @@ from trunnion.solve.seating import seating_of
 if TYPE_CHECKING:
     from ezdxf.layouts.layout import Modelspace
 
-__all__ = ["AUXILIARY", "Polygon", "polygons_of", "write"]
-
 AUXILIARY = "~"
 FORBIDDEN = str.maketrans(dict.fromkeys('<>/\\":;?*|=`,', "_"))
 MM = 1e3  # of a metre

@@ -24,9 +24,6 @@ from trunnion.exchange.drawing import AUXILIARY
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
-
-__all__ = ["read"]
-
 GROUNDS = ("ground", "frame", "base", "fixed")  # words in the name of a layer that does not move; else it is layer 0
 CHAINED = ("CENTER", "DASHDOT", "DIVIDE", "MITTE", "ACAD_ISO04", "ACAD_ISO10")  # how linetypes of centre lines begin
 CENTRES = ("center", "centre", "mittel", "axis")  # words in the names of layers of centre lines

@@ -26,8 +26,6 @@ from trunnion.exchange.draft import Positions
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import read_mechanism
 
-__all__ = ["MODEL", "Linkage", "write"]
-
 MODEL = "model.yaml"  # beside this file
 UNITS = {
     "s": Unit("s", s=1), "rad": Unit("rad", rad=1), "rad/s": Unit("rad/s", rad=1, s=-1), "m": Unit("m", m=1),

@@ -25,8 +25,6 @@ from trunnion.model.units import KINDS, UnitError
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["FORMATS", "Format", "export_model", "import_file"]
-
 LINKS = "http:/", "https:/"  # how a path begins that is a link: its text is read, nothing is fetched
 FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read

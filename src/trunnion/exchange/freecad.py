@@ -20,8 +20,6 @@ from scipy.spatial.transform import Rotation
 
 from trunnion.exchange.draft import PARALLEL, Body, Draft, ImportOptions, Pair, Place, few, free_name, refused
 
-__all__ = ["read"]
-
 MEMBER = "Document.xml"
 LARGEST, MOST, MEMBERS = 100_000_000, 1_000_000, 100_000  # bytes and elements of it; members of an archive
 MILLI = 1e-3  # m

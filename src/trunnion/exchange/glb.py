@@ -18,8 +18,6 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Draft, Pair, Positions, perpendicular
 from trunnion.version import __version__
 
-__all__ = ["write"]
-
 ROD, PIN, LONG = 0.012, 0.02, 3.0  # radius of a rod and of a pin that states none, of the size; rails by their sliders
 SIDES = 24  # of a cylinder
 COLOURS = [(0.45, 0.47, 0.5), (0.84, 0.37, 0.0), (0.0, 0.45, 0.7), (0.0, 0.62, 0.45), (0.8, 0.47, 0.65),

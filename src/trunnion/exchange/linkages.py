@@ -21,8 +21,6 @@ import numpy as np
 
 from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
 
-__all__ = ["read", "read_link"]
-
 GROUND = "ground"
 MOST = 2000  # pins and bars of a linkage
 LARGEST = 10_000_000  # bytes of a file

@@ -20,8 +20,6 @@ from trunnion.exchange.brep import Face
 from trunnion.exchange.draft import Array, Draft, Pair, components, free_name, perpendicular
 from trunnion.joints.fits import fit, limits
 
-__all__ = ["joined"]
-
 ANGLE = 1e-4  # rad, between axes or planes that count as parallel
 NEAR = 1e-6  # m, between places that count as equal
 COVERED = 0.55, 0.45  # of a turn: a hole that holds its pin; one that may

@@ -15,8 +15,6 @@ from defusedxml import ElementTree
 
 from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Place, few, free_name, refused
 
-__all__ = ["read"]
-
 MOST_BYTES, MOST_XML = 30_000_000, 20_000_000  # of a file; of the model of a 3MF, unpacked
 MOST_BODIES = 500
 DEEPEST = 8  # components of components in a 3MF

@@ -33,8 +33,6 @@ from trunnion.exchange.robots import (
 )
 from trunnion.joints.pairs import PAIRS
 
-__all__ = ["read", "write"]
-
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
 NAMES = {pair: name for name, pair in KINDS.items()}
 BRINGS = ("include", "attach", "replicate", "composite", "flexcomp", "extension")  # elements that stand for bodies

@@ -14,8 +14,6 @@ from trunnion.exchange.draft import Array, Body, Draft, Pair, moved, printable
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import nearest
 
-__all__ = ["complete", "flat_frame", "model_text"]
-
 DIGITS = 12  # significant digits of a written number
 FIXED = ("ground", "frame", "base", "housing", "world", "gestell", "rahmen", "bâti")  # in names of fixed parts
 TINY = 1e-12  # of the size of the mechanism: below it a coordinate is rounding

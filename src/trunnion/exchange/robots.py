@@ -28,9 +28,6 @@ from trunnion.exchange.draft import (
     refused,
 )
 
-__all__ = ["Scene", "laid_out", "numbers", "opening", "parsed", "spanning", "stem", "steps", "tensor",
-           "text_of", "turned", "unit", "written"]  # fmt: skip
-
 MOST_BYTES, MOST_TAGS, MOST_PARTS = 10_000_000, 200_000, 2_000
 LONGEST = 1000  # characters of a row of numbers
 MEETING = 1e-8  # m, between the axes of joints that count as crossing

@@ -31,8 +31,6 @@ from trunnion.exchange.robots import (
     written,
 )  # fmt: skip
 
-__all__ = ["read", "read_urdf", "write", "write_urdf"]
-
 TYPES = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "ball": "spherical",
          "universal": "universal", "revolute2": "universal", "screw": "helical", "fixed": "fixed",
          "planar": "planar"}  # fmt: skip  # the last of URDF

@@ -35,8 +35,6 @@ from trunnion.exchange.mating import joined
 from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.step_assembly import Assembly, Occurrence
 
-__all__ = ["read", "write", "write_moved"]
-
 PATIENCE = 60.0  # s, for the mesh of a free-form solid
 DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and angle, rad
 SIZE = 0.02  # of the mechanism: length of an axis of a skeleton that has no bearing

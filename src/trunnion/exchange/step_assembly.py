@@ -12,8 +12,6 @@ import numpy as np
 from trunnion.exchange.brep import Geometry, Part21, Ref, Solid
 from trunnion.exchange.draft import Place, few, refused
 
-__all__ = ["Assembly", "Occurrence"]
-
 MOST = 2000  # occurrences of parts
 PREFIXES = {"KILO": 1e3, "DECI": 0.1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6, "NANO": 1e-9, None: 1.0}
 SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS")

@@ -24,8 +24,6 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import Vector3, apply, cross, dot, length, plus, product, scaled, transpose
 from trunnion.groups.dyad import root
 
-__all__ = ["BRANCHES", "Loop", "closure", "condition", "meet", "position", "rates"]
-
 BRANCHES = (1, -1)
 
 

@@ -21,11 +21,6 @@ from trunnion.solve.run import CHUNK, Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.system import Values
 
-__all__ = [
-    "Curves", "Kernel", "NumpyKernel", "SeatedKernel", "courses_of", "lanes_of", "picked", "shape_of", "step_of",
-    "where_known",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Curves = dict[str, tuple[Number, ...]]  # the parts of the course of each measure
 STEP, STEP_OF_NONE = 1e-3, 1e-4  # of a number, and of the size of the mechanism for one that is 0: of a difference

@@ -37,12 +37,11 @@ from trunnion.algebra.panels import (
     weighted,
 )  # fmt: skip
 from trunnion.errors import Status
-from trunnion.measures.measures import Measure, near
+from trunnion.measures.measures import Measure
 from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run
-
-__all__ = ["SIGNS", "Panels", "Read", "Reading", "combined", "direction", "turn", "within_limits"]
+from trunnion.solve.switches import near
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump

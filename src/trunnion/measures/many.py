@@ -24,7 +24,7 @@ from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.errors import Status
 from trunnion.measures.evaluation import Kernel, SeatedKernel, lanes_of, picked, step_of
 from trunnion.measures.figures import Panels, Read, Reading, combined, turn
-from trunnion.measures.measures import Measure, angles, near, within
+from trunnion.measures.measures import Measure, angles, within
 from trunnion.measures.positions import ends_by_name, moved
 from trunnion.results.dataset import ROUNDING, Scales
 from trunnion.solve.friction_method import FrictionMethod
@@ -38,13 +38,12 @@ from trunnion.solve.switches import (
     accuracy_of,
     bends,
     breaks_between,
+    near,
     shifts_of,
     stated_bends,
     tracked,
 )
 from trunnion.solve.system import Values
-
-__all__ = ["Many", "Read", "figures_of"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

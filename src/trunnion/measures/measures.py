@@ -40,11 +40,6 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import near, turned
 from trunnion.solve.system import System, Values
 
-__all__ = [
-    "CURVES", "MOTIONS", "Formula", "Measure", "angle_at", "angles", "chosen", "coordinate_unit", "named", "near",
-    "outputs", "pressure_angles", "rate_of_angle", "value", "within",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")

@@ -23,8 +23,6 @@ from trunnion.solve.system import System, Values
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["PositionPlan", "Window", "ends_by_name", "gain_of", "moved", "path_of", "place_of", "plan"]
-
 Array = NDArray[np.float64]
 
 CLOSE = 0.25  # of a step: a position of the grid that is closer to the end of a window gives way to it

@@ -50,11 +50,6 @@ from trunnion.solve.loads import useful_loads, useful_springs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "CAUSES", "VARIABLES", "Verdict", "causes", "compare", "independent", "judge", "of_data", "other_speed",
-    "written_unit",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"
 SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses

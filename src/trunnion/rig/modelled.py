@@ -23,10 +23,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import sticking
 
-__all__ = [
-    "Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "same_cycle", "turned",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 FAR = 0.05  # of a speed: an error of the settings
 RIPPLE = 0.3  # of what pulses take of a speed, by where they come: 8/√720, the rest of a parabola over a straight line

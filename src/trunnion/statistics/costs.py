@@ -13,8 +13,6 @@ from typing import Literal
 
 import numpy as np
 
-__all__ = ["COST_MODELS", "Cost", "CostModel"]
-
 
 @dataclass(frozen=True)
 class CostModel:

@@ -20,8 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-__all__ = ["DISTRIBUTIONS", "Distribution", "Options", "normal_parameters"]
-
 Floats = NDArray[np.float64]
 Options = Mapping[str, Any]
 

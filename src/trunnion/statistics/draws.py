@@ -19,8 +19,6 @@ from scipy import special
 
 from trunnion.statistics.distributions import DISTRIBUTIONS, Distribution, Options, normal_parameters
 
-__all__ = ["Marginal", "Population", "correlated", "factor", "mixed", "sobol", "uniforms"]
-
 Floats = NDArray[np.float64]
 BITS, SOBOL_BITS = 52, 32  # of random numbers
 BELOW_ONE = 1 - 2.0**-53

@@ -12,11 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-__all__ = [
-    "Moments", "by_replicates", "capability", "moments_of", "of_deviation", "of_mean", "of_quantile", "share",
-    "share_by_replicates",
-]  # fmt: skip
-
 Floats = NDArray[np.float64]
 Interval = tuple[Floats, Floats]
 TAIL = 0.025  # chance that the true figure lies below an interval, and above it

@@ -33,8 +33,6 @@ from trunnion.solve.system import Cycle, System, Values
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIGURES", "AssemblyStatus", "AssemblyStudy", "assemble"]
-
 Array = NDArray[np.float64]
 Uniform = Literal["pins", "all"]
 ROUNDING = 1e-9  # rad, or of the size: an opening below it beside a larger one of the other kind is none

@@ -30,8 +30,6 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.version import __version__
 
-__all__ = ["Checkpoint", "Job", "Part", "run", "settings"]
-
 AHEAD = 2  # blocks given to every worker: the one under way and the next
 PAUSE = 0.5  # s; Windows hears Ctrl-C only between two waits
 DEATHS = 3  # workers that die one after another before a block is finished

@@ -19,8 +19,6 @@ except ImportError:
     what, remedy = "a cluster needs the package distributed", "pip install 'trunnion[cluster]'"
     raise MechanismError(Finding(what, "cluster", remedy)) from None
 
-__all__ = ["connected"]
-
 CONNECT = 10  # s to reach the scheduler
 ARRIVE = 60  # s for the first worker to be there
 START = "start it with `dask scheduler` and `dask worker ADDRESS`: with a --checkpoint, no block is done twice"

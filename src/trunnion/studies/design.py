@@ -33,11 +33,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms, knots_of
 
-__all__ = [
-    "Centre", "Counterweight", "Design", "Extremes", "counterweights", "dead_centres", "design", "grashof",
-    "instant_centres", "pressure_angles", "report_figures", "shaking", "transmission_angles",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 EXACT = Accuracy(1e-12, 1e-14, shortest=1e-14)  # of the motion alone: dead centres and limits

@@ -47,8 +47,6 @@ from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStud
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EXTREMES", "VARIABLES", "play"]
-
 EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
 BESIDE = 1e-6  # of the cycle: a place on one side of a break, which is named by the break
 EQUAL = 1e-9  # of a worst case: links on which a pin does as much, of which the first is taken

@@ -54,7 +54,6 @@ from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Cycle, System, law_of, rubbing
 from trunnion.studies.sweep_grid import (
     FIGURES,
-    MOST_POINTS,
     Over,
     Reduced,
     Swept,
@@ -67,8 +66,6 @@ from trunnion.studies.sweep_grid import (
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["FIGURES", "MOST_POINTS", "Points", "Swept", "sweep"]
 
 AT_ONCE = 10_000  # numbers in an array, which then stays in cache
 COMPILED_AT_ONCE = 1 << 18

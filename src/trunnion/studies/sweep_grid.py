@@ -23,8 +23,6 @@ from trunnion.results.dataset import Variable
 from trunnion.solve.run import Run
 from trunnion.solve.system import System
 
-__all__ = ["FIGURES", "MOST_NAMES", "MOST_POINTS", "Over", "Swept", "at_point", "grid", "say"]
-
 MOST_POINTS = 100_000
 MOST_NAMES = 6
 SUBJECTS = ("driver", "joint")  # the dimensions that are not swept

@@ -49,8 +49,6 @@ from trunnion.views.scene import blocks_of, scene
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ANSWERS", "answer"]
-
 MOST_OTHERS = 3  # assemblies
 FILES = {"csv": "text/csv", "report": "text/html", "png": "image/png", "svg": "image/svg+xml"}
 MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground

@@ -23,8 +23,6 @@ from trunnion.studio.drawing import NUMBER, acted_on, free, letter, names_in_use
 from trunnion.studio.findings import spoken
 from trunnion.studio.sketch import LIMITS, Sketch, coordinates, refused
 
-__all__ = ["add_row", "delete", "group", "put_value", "rename"]
-
 Fields = Mapping[str, Any]
 SECTIONS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"

@@ -19,12 +19,6 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError
 from trunnion.studio.sketch import TOGETHER, Frame, Sketch, coordinates, refused
 
-__all__ = [
-    "NUMBER", "acted_on", "add_point", "bar", "bar_mass", "centre", "driver", "free", "gear", "join", "letter",
-    "line_near", "link", "load", "located", "move", "names_in_use", "numbered", "pinned", "place_of", "point_of",
-    "rename_point", "slide", "spring", "typed", "vector",
-]  # fmt: skip
-
 Fields = Mapping[str, Any]
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"

@@ -29,8 +29,6 @@ from trunnion.views.axis import abscissa, names
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["cures", "figures", "margin_of", "missing", "reached", "readiness", "remedied", "sentence", "spoken"]
-
 MOST_RATIOS = 12  # of a longer row nobody reads them
 ENOUGH = 0.9  # of the friction at which it just runs: what is tried
 NOUNS = {

@@ -20,8 +20,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Jobs"]
-
 REPORT, MODEL, OUTPUT = "report.html", "model.yaml", "output.txt"
 MOST_RUNNING, MOST_KEPT = 2, 30
 TAIL = 20_000  # signs of the output that the page shows

@@ -28,8 +28,6 @@ from trunnion.solve.system import Values, rubbing
 from trunnion.studio.loaded import Asked, Loaded, loaded
 from trunnion.studio.sketch import refused
 
-__all__ = ["Live", "columns", "live_in_space", "places_at", "thumbnail", "tracks", "uncollected"]
-
 Array = NDArray[np.float64]
 
 AT_ONCE = 12_000  # joints times positions whose forces are worked out in the time of a picture

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from trunnion.cycle.positions import Positions
     from trunnion.results.dataset import Column
 
-__all__ = ["MOST_LINKS", "Asked", "Cycle", "Loaded", "columns_of", "loaded"]
-
 MOST_SIGNS = 300_000  # of a text: what is longer takes seconds to read at every stroke of a key
 MOST_LINKS = 400  # that are solved while one draws
 STEPS, MOST_STEPS = 360, 3600

@@ -12,8 +12,6 @@ from importlib.resources.abc import Traversable
 
 from trunnion.views.page import module
 
-__all__ = ["document", "found", "one_file", "script"]
-
 PLACES = {"studio": ("trunnion.studio", "web"), "web": ("trunnion.views", "web")}
 IMPORT_MAP = re.compile(r'<script type="importmap"[^>]*>(.*?)</script>', re.S)
 

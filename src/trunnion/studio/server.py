@@ -38,8 +38,6 @@ from trunnion.files import whole
 from trunnion.studio.jobs import Jobs
 from trunnion.studio.page import document, found, script
 
-__all__ = ["Studio"]
-
 SUBPROTOCOL = "trunnion"  # of the socket; the token comes as a second one, for a browser sends no other header there
 STRANGER = """<!doctype html><meta charset="utf-8"><title>Trunnion</title>
 <body style="font: 16px/1.5 system-ui, sans-serif; max-width: 40em; margin: 4em auto; padding: 0 1em">

@@ -23,8 +23,6 @@ from trunnion.model.fields import FIXED_NAMES
 from trunnion.model.parameters import Numbers
 from trunnion.model.units import unit
 
-__all__ = ["LIMITS", "TOGETHER", "Frame", "Sketch", "coordinates", "refused"]
-
 Entries = dict[str, Any]
 
 TOGETHER = 1e-9  # of the size: joints nearer than this lie on one spot

@@ -15,8 +15,6 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
 from trunnion.studio.page import found, one_file
 
-__all__ = ["StudioWidget", "studio"]
-
 NAME = "mechanism.yaml"
 
 

@@ -10,8 +10,6 @@ from typing import Any
 from trunnion.studio.drawing import bar, driver, gear, letter, line_near, numbered, place_of, point_of, slide, typed
 from trunnion.studio.sketch import Frame, Sketch, refused
 
-__all__ = ["block"]
-
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
 CORNER = rect(0.8, 1.4)  # of a triad's plate: from its middle, in the direction of its pin, how near and how far turned
 LEVER = 1.5  # of the distance of its pins, how long the link of an RPR is

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.cycle.locking import HELD_AND_DRIVEN, LockingState
+from trunnion.cycle.locking_course import HELD_AND_DRIVEN, LockingState
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import GUIDED, PAIRS
 from trunnion.model.quantity import Quantity

@@ -25,7 +25,7 @@ from trunnion.results.dataset import without_noise
 from trunnion.results.quantities import SUPERSCRIPT, WORDS, prefixed
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.studies.sweep import FIGURES
+from trunnion.studies.sweep_grid import FIGURES
 from trunnion.views.axis import Array
 from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Panel, Plot, Stripe
 from trunnion.views.curves import check_kind, ease_of_status, outside, usual_peak

@@ -25,9 +25,6 @@ from trunnion.errors import Status
 from trunnion.rig.identification.signals import Courses, Model
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, rms
 
-__all__ = ["FAR", "Block", "Fit", "SensorError", "Solution", "corners", "evaluations", "refined", "sensor_errors",
-           "shared_zero", "sizes_of", "solved"]  # fmt: skip
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 FILE_ZERO, FILE_ANGLE = "zero of each file", "angle of each condition"  # the latter by the sampling of pulses

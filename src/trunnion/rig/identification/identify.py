@@ -55,8 +55,6 @@ from trunnion.solve.run import Run, prepare
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "identify", "with_estimates"]
-
 Array = NDArray[np.float64]
 SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",

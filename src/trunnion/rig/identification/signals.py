@@ -27,8 +27,6 @@ from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 
-__all__ = ["Courses", "DriveCycle", "Model", "Parameters", "Unknown", "limits", "paths_of", "unknowns"]
-
 Array = NDArray[np.float64]
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
 AT_ONCE = 20_000  # numbers in an array

@@ -21,8 +21,6 @@ from trunnion.rig.identification.fit import Fit, sizes_of
 from trunnion.rig.reading.measurement import student
 from trunnion.rig.reading.turns import covariance_of_steps
 
-__all__ = ["CONFIDENCE", "Covariances", "LackOfFit", "inseparable", "lack_of_fit", "quantile", "spread_of"]
-
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 NEIGHBOURS = 5  # frequencies that a power is smoothed over

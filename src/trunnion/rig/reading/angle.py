@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, counted
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import DataTable
-from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, counted, joined, missing, unit_of
-
-__all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
+from trunnion.rig.reading.turns import GAP, TURN, Say, Timeline, at_times, joined, missing, unit_of
 
 Array = NDArray[np.float64]
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which pulses are smoothed, the longest first

@@ -24,11 +24,6 @@ from trunnion.model.schema import SchemaGenerator
 from trunnion.model.units import UnitError
 from trunnion.rig.reading import units
 
-__all__ = [
-    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "Mapped", "Mean", "Pulses", "TimeBase",
-    "Zero", "read_mapping", "schema_text",
-]  # fmt: skip
-
 Sign = Literal[1, -1]
 Pulses = Annotated[int, Field(ge=1, le=10_000_000)]  # of a turn
 

@@ -23,12 +23,6 @@ from trunnion.rig.reading.turns import LeftOfSteps
 if TYPE_CHECKING:
     import xarray as xr
 
-
-__all__ = [
-    "COVERAGE", "Accuracy", "Condition", "Contribution", "Efficiency", "Measurement", "Powers", "Signal",
-    "Uncertainty", "between_turns", "dataset", "efficiency_of", "pairs_of", "rms", "student",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
 VARIABLES = {

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.angle import coordinate
@@ -30,7 +30,6 @@ from trunnion.rig.reading.turns import (
     Say,
     Timeline,
     Turns,
-    counted,
     cut,
     gathered,
     joined,
@@ -45,8 +44,6 @@ from trunnion.rig.reading.turns import (
     unit_of,
 )  # fmt: skip
 from trunnion.rig.reading.units import SensorScale, alike, default_unit, unit_name
-
-__all__ = ["read_measured"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

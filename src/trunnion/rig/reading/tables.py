@@ -25,8 +25,6 @@ from trunnion.files import reading
 from trunnion.model.csv_table import NOTHING, TIME, bare, cells_of, heading, number, numbered, separator_of, units_below
 from trunnion.rig.reading.units import dimensions
 
-__all__ = ["FORMATS", "Column", "DataTable", "read_table"]
-
 Array = NDArray[np.float64]
 NAMED = 40  # columns in a message
 

@@ -26,12 +26,6 @@ from trunnion.rig.reading.mapping import TimeBase
 from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.units import alike, dimensions
 
-__all__ = [
-    "DENSE", "GAP", "TURN", "LeftOfSteps", "Say", "Timeline", "Turns", "at_times", "counted", "covariance_of_steps",
-    "cut", "gathered", "in_step", "joined", "left_in_turns", "left_of_steps", "lost", "missing", "noise_before",
-    "resampled", "runs", "time_mean", "timeline", "turn_means", "unit_of",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Say = Callable[[Finding | str | None], None]  # takes a finding, or a sentence about what was done

@@ -19,12 +19,6 @@ from trunnion.model.measure_table import MEASURES
 from trunnion.model.names import nearest
 from trunnion.model.units import BASES, UnitError, normalise, pound_feet, root, si_unit, unit
 
-__all__ = [
-    "HERTZ", "ZERO", "Amount", "Angle", "AngleUnit", "AngularSpeed", "Dimensions", "Frequency", "MeasureText", "Number",
-    "Positive", "SensorScale", "Share", "Size", "Step", "Time", "TimeUnit", "UnitText", "alike", "default_unit",
-    "dimensions", "multiplied", "read_amount", "scale", "unit_name",
-]  # fmt: skip
-
 Dimensions = Mapping[str, Fraction]
 HERTZ: Dimensions = {"s": Fraction(-1)}
 VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}

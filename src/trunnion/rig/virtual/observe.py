@@ -52,8 +52,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.version import __version__
 
-__all__ = ["Case", "Observation", "Record", "check_folder", "check_form", "observe", "phases"]
-
 Array = NDArray[np.float64]
 MOST_ROWS = 20_000_000
 MOST_SEEDS = 1 << 128

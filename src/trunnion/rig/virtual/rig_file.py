@@ -33,11 +33,6 @@ from trunnion.model.units import UnitError
 from trunnion.rig.reading import units
 from trunnion.rig.reading.mapping import Accuracies, Pulses
 
-__all__ = [
-    "FORMATS", "Encoder", "Rig", "Schedule", "Sensor", "SensorChannel", "SensorErrors", "Value", "draw",
-    "placed_in_rig", "pulsed", "readings", "resolved", "smoothed", "stream",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 READINGS = ("V", "A", "Hz")  # what the reading of a sensor with a sensitivity may be in
 FINE = 1e-3  # of a step of the converter, or of the noise: decimals of a reading beyond are not written

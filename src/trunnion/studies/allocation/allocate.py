@@ -40,8 +40,6 @@ from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, check_shar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["allocate", "half_widths"]
-
 Array = NDArray[np.float64]
 START = 1e-5  # m: a play that is none yet is first looked at with this one
 ROUNDS = 10

@@ -26,10 +26,6 @@ from trunnion.model.tolerances import ProcessChoice
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.statistics.costs import Cost
 
-__all__ = [
-    "AllocationProblem", "Answer", "Contribution", "Criterion", "RowEffects", "SampledYield",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it

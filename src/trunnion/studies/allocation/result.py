@@ -22,10 +22,6 @@ from trunnion.studies.tolerance.linear import ToleranceStudy
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "CLOSE", "DEFAULT_YIELD", "VARIABLES", "Allocated", "dataset", "share_of",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 DEFAULT_YIELD = 0.9973
 CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought

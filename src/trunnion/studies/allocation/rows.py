@@ -25,8 +25,6 @@ from trunnion.studies.allocation.problem import AllocationProblem, Criterion, Ro
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, sound
 
-__all__ = ["Rows", "rows_of", "used_curve"]
-
 Array = NDArray[np.float64]
 ANY = 1e-6  # half width, SI, at which the shape of a distribution is taken where there is none yet
 NUMBERS = ("linear", "spread", "drift", "lower", "upper", "offset")  # of effects, by row

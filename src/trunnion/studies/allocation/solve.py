@@ -40,8 +40,6 @@ from trunnion.studies.allocation.problem import (
     shortfalls,
 )
 
-__all__ = ["cheapest"]
-
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 ACCEPTED = ("Solved", "AlmostSolved", "InsufficientProgress")

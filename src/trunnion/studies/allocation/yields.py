@@ -21,8 +21,6 @@ from trunnion.statistics.draws import factor, sobol
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield
 from trunnion.studies.allocation.solve import cheapest
 
-__all__ = ["Verify", "meet", "normal_yield"]
-
 Array = NDArray[np.float64]
 Verify = Callable[[Array, int], SampledYield]
 DIRECTIONS = 2048

@@ -29,8 +29,6 @@ from trunnion.model.tolerances import FULL_TURN
 from trunnion.solve.shifts import CARRIERS
 from trunnion.studies.tolerance.inputs import Inputs
 
-__all__ = ["Corner", "Effects", "FirstOrder", "Pin", "Spread", "effects_of", "length", "search"]
-
 Array = NDArray[np.float64]
 Vector = NDArray[np.float64]  # (component, …)
 SHARE = "share."  # of the radius at which a pin lies in its hole: before the path of its offset, at a corner

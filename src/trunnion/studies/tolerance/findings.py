@@ -29,8 +29,6 @@ from trunnion.studies.tolerance.effects import Corner
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, limited
 from trunnion.studies.tolerance.sampling import Indices, Samples
 
-__all__ = ["Outcome", "findings_of", "summary"]
-
 Array = NDArray[np.float64]
 Sampled = Mapping[str, Any]  # arrays by the names of `result.VARIABLES`
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept

@@ -24,8 +24,6 @@ from trunnion.solve.run import Run
 from trunnion.solve.shifts import Play, given_offsets
 from trunnion.statistics.draws import Marginal, Population, correlated
 
-__all__ = ["Inputs", "inputs_of", "plays_of"]
-
 Array = NDArray[np.float64]
 
 

@@ -36,8 +36,6 @@ from trunnion.solve.walk_kernel import WalkKernel
 from trunnion.statistics.draws import uniforms
 from trunnion.studies.tolerance.inputs import Inputs
 
-__all__ = ["engine_for", "kernel_of", "many_of"]
-
 AT_ONCE = 1 << 20  # numbers in an array of the compiled engine
 PILOTS = 24  # samples that tell how finely the courses of all have to be resolved
 MOST_RUNS = 512  # mechanisms whose seats are kept

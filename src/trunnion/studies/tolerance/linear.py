@@ -24,13 +24,14 @@ from trunnion.algebra.panels import selected
 from trunnion.cycle.cycle_kernel import Engine
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.evaluation import NumpyKernel
-from trunnion.measures.figures import turn
-from trunnion.measures.many import Many, Read
-from trunnion.measures.measures import Measure, chosen, near, outputs, within
+from trunnion.measures.figures import Read, turn
+from trunnion.measures.many import Many
+from trunnion.measures.measures import Measure, chosen, outputs, within
 from trunnion.measures.positions import PositionPlan, moved, place_of, plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.switches import near
 from trunnion.studies.tolerance.effects import (
     NOBODY,
     Corner,
@@ -44,17 +45,6 @@ from trunnion.studies.tolerance.effects import (
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import engine_for, kernel_of, many_of
 from trunnion.studies.tolerance.sampling import PLACES, Sampling, towards
-
-__all__ = [
-    "MeasureOrder",
-    "Table",
-    "ToleranceStudy",
-    "WorstCorner",
-    "limited",
-    "stated_or_outputs",
-    "study",
-    "worst_corner",
-]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers

@@ -26,8 +26,6 @@ from trunnion.studies.tolerance.sampling import Samples
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CAUSES", "QUANTILES", "VARIABLES", "course_text", "dataset", "limits_of", "sampled", "text_of"]
-
 Array = NDArray[np.float64]
 Interval = tuple[Any, Any]
 QUANTILES = (0.00135, 0.005, 0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975, 0.995, 0.99865)

@@ -28,8 +28,6 @@ from trunnion.studies.batch import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import kernel_of, many_of
 
-__all__ = ["METHODS", "Indices", "Sampler", "Samples", "Sampling", "indices", "towards"]
-
 Array = NDArray[np.float64]
 Method = Literal["monte-carlo", "quasi-monte-carlo"]
 METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")

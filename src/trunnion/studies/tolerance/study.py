@@ -26,8 +26,6 @@ from trunnion.studies.tolerance.findings import Outcome
 from trunnion.studies.tolerance.linear import study
 from trunnion.studies.tolerance.result import dataset
 
-__all__ = ["DEFAULT_METHODS", "Method", "check_share", "sample", "tolerance"]
-
 Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000

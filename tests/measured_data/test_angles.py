@@ -1,17 +1,13 @@
 """Every source of the angle gives the same courses, and resampling gives back what is known as closely as stated."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 import trunnion
-from measured_data.recording import IDLE, RPM, ZERO, Columns, codes, mapping, off, read, recorded, text_of
+from measured_data.recording import IDLE, RPM, ZERO, codes, mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError
 from trunnion.rig.modelled import in_condition
 from trunnion.rig.reading.read import read_measured, resolution
@@ -20,7 +16,7 @@ OMEGA = RPM * np.pi / 30
 
 
 @pytest.fixture(scope="module")
-def clean() -> Columns:
+def clean():
     columns = recorded(noise=0.0)
     columns["deg"] = np.degrees(columns["angle"]) % 360
     columns["fine"] = np.floor(columns["angle"] / (2 * np.pi) * 1440)
@@ -31,7 +27,7 @@ def clean() -> Columns:
     return columns
 
 
-SOURCES: dict[str, tuple[dict[str, Any], float]] = {
+SOURCES = {
     "count": ({"from": "pulses", "column": "encoder", "per_turn": 60}, 0.05),
     "many a sample": ({"from": "pulses", "column": "fine", "per_turn": 1440}, 0.05),
     "wraps at 256": ({"from": "pulses", "column": "wrapped", "per_turn": 60, "wrap": 256}, 0.05),
@@ -46,9 +42,9 @@ SOURCES: dict[str, tuple[dict[str, Any], float]] = {
 
 @pytest.mark.spread(4)
 @pytest.mark.parametrize("source", SOURCES)
-def test_sources(clean: Columns, tmp_path: Path, source: str) -> None:
+def test_sources(clean, tmp_path, source):
     angle, within = SOURCES[source]
-    changes: dict[str, Any] = {"angle": angle}
+    changes = {"angle": angle}
     if source == "time":  # which has turns while it stands, too
         columns = {name: values[1000:] for name, values in clean.items()}
         changes["channels/torque-in/zero"] = "50 mV"
@@ -62,7 +58,7 @@ def test_sources(clean: Columns, tmp_path: Path, source: str) -> None:
     assert off(one) < within
 
 
-def test_a_driver_that_runs_backward(clean: Columns, tmp_path: Path) -> None:
+def test_a_driver_that_runs_backward(clean, tmp_path):
     """Its cycle is gone through from the start of the model's in the direction in which it runs."""
     changes = {"angle": {"from": "pulses", "column": "down", "per_turn": 60}, "channels/speed-in/sign": -1}
     (one,) = read(
@@ -74,7 +70,7 @@ def test_a_driver_that_runs_backward(clean: Columns, tmp_path: Path) -> None:
     assert np.nanmax(np.abs(course + (20 + 5 * np.sin(angle) + 2 * np.cos(2 * angle)))) < 0.05
 
 
-def test_cycles_of_other_lengths(clean: Columns, tmp_path: Path) -> None:
+def test_cycles_of_other_lengths(clean, tmp_path):
     clean = {**clean, "T1": 0.1 * np.sin(clean["angle"] / 2)}
     base = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0}
     (one,) = read(clean, tmp_path, {**base, "cycle": "720 deg"}).conditions
@@ -92,7 +88,7 @@ def test_cycles_of_other_lengths(clean: Columns, tmp_path: Path) -> None:
 @pytest.mark.spread(4)
 @pytest.mark.parametrize("positions", [36, 90, 360, 500])
 @pytest.mark.parametrize("harmonic", [1, 3, 8])
-def test_resampling_of_a_known_sinus(clean: Columns, tmp_path: Path, harmonic: int, positions: int) -> None:
+def test_resampling_of_a_known_sinus(clean, tmp_path, harmonic, positions):
     """Mean about a position: too small by (π h/p)²/6; interpolated: by less than (2π h/n)⁴/40, n samples a turn."""
     columns = {**clean, "T1": 0.1 * np.sin(harmonic * clean["angle"])}
     changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0, "positions": positions}
@@ -104,7 +100,7 @@ def test_resampling_of_a_known_sinus(clean: Columns, tmp_path: Path, harmonic: i
     assert error < bound + 1e-9
 
 
-def test_nothing_is_interpolated_across_a_jump(clean: Columns, tmp_path: Path) -> None:
+def test_nothing_is_interpolated_across_a_jump(clean, tmp_path):
     """A torque of 4 N m that turns its sign twice a turn: a cubic through both sides would be off by up to 0.5 N m."""
     jumps = np.where(np.sin(clean["angle"] + 0.3) > 0, 0.4, -0.4) + 0.01 * np.sin(clean["angle"])
     changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0, "positions": 360}
@@ -116,7 +112,7 @@ def test_nothing_is_interpolated_across_a_jump(clean: Columns, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("width", [0.005, 0.01, 0.02])
-def test_a_narrow_peak_is_no_jump(clean: Columns, tmp_path: Path, width: float) -> None:
+def test_a_narrow_peak_is_no_jump(clean, tmp_path, width):
     """A normal peak of 4 N m, its standard deviation a share of a turn of 500 samples: by cubics, h⁴/40 of d⁴/dt⁴."""
     peak = np.exp(-((np.mod(clean["angle"] / (2 * np.pi), 1.0) - 0.4) ** 2) / (2 * width**2))
     changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0, "positions": 360}
@@ -125,7 +121,7 @@ def test_a_narrow_peak_is_no_jump(clean: Columns, tmp_path: Path, width: float) 
     assert np.max(np.abs(one.courses["torque-in"].mean - true)) < 4 * 3 / (500 * width) ** 4 / 40
 
 
-def test_averaging_lessens_noise(tmp_path: Path) -> None:
+def test_averaging_lessens_noise(tmp_path):
     """Of n samples a position and N turns the mean scatters by σ/√(n N), and the standard uncertainty says so."""
     columns = recorded(turns=60, noise=0.5, seed=3)
     (one,) = read(columns, tmp_path, {"positions": 36, "channels/torque-in/zero": "50 mV"}).conditions
@@ -137,7 +133,7 @@ def test_averaging_lessens_noise(tmp_path: Path) -> None:
     assert np.sqrt(np.mean((error / course.uncertainty) ** 2)) == pytest.approx(1, abs=0.4)
 
 
-def test_filter_has_no_delay_and_halves_the_power_at_its_cut_off(clean: Columns, tmp_path: Path) -> None:
+def test_filter_has_no_delay_and_halves_the_power_at_its_cut_off(clean, tmp_path):
     columns = {**clean, "T1": 0.1 * (np.sin(clean["angle"]) + np.sin(20 * clean["angle"]))}
     changes = {"angle": {"from": "column", "column": "angle"}, "channels/torque-in/zero": 0}
     found = read(columns, tmp_path, {**changes, "positions": 360, "filter": {"cut_off": "200 Hz"}})
@@ -150,7 +146,7 @@ def test_filter_has_no_delay_and_halves_the_power_at_its_cut_off(clean: Columns,
     assert any("200 Hz" in sentence for sentence in found.done)
 
 
-def test_a_mean_of_a_channel_is_over_time(tmp_path: Path) -> None:
+def test_a_mean_of_a_channel_is_over_time(tmp_path):
     """Of a speed that varies within the turn the mean over equal angles is too high, by half its share squared."""
     angle = np.linspace(0, 40 * np.pi, 400_001)
     speed = OMEGA * (1 + 0.3 * np.sin(2 * angle))
@@ -168,7 +164,7 @@ def test_a_mean_of_a_channel_is_over_time(tmp_path: Path) -> None:
     assert one.courses["speed-in"].turns.mean() == pytest.approx(OMEGA, rel=3e-4)
 
 
-def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> None:
+def test_units_of_what_is_set_stay_with_it(clean, tmp_path):
     settings = {"misalignment": "15 deg", "load": "3 N m", "a": {"mean": "brake"}, "b": 2}
     (one,) = read(clean, tmp_path, {"set": settings}).conditions
     assert one.units == {"misalignment": "rad", "load": "N m", "a": "N m"}
@@ -184,7 +180,7 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
 @pytest.mark.parametrize("wrap", [50, 60, 61, 100, 250, 256, 300, 360])
 @pytest.mark.parametrize("per_turn", [60, 1440])
 @pytest.mark.parametrize("way", [1, -1])
-def test_a_counter_that_wraps_anywhere(clean: Columns, tmp_path: Path, wrap: int, per_turn: int, way: int) -> None:
+def test_a_counter_that_wraps_anywhere(clean, tmp_path, wrap, per_turn, way):
     """With three counts a sample as well as with one in eight."""
     counts = np.floor(way * clean["angle"] / (2 * np.pi) * per_turn)
     changes = {"angle": {"from": "pulses", "column": "encoder", "per_turn": per_turn, "sign": way, "wrap": wrap}}
@@ -198,7 +194,7 @@ def test_a_counter_that_wraps_anywhere(clean: Columns, tmp_path: Path, wrap: int
         assert off(one) < 0.08
 
 
-def test_a_counter_that_is_set_back_is_refused(clean: Columns, tmp_path: Path) -> None:
+def test_a_counter_that_is_set_back_is_refused(clean, tmp_path):
     """What follows has no zero."""
     counts = clean["encoder"].copy()
     counts[6000:] -= counts[6000]
@@ -206,7 +202,7 @@ def test_a_counter_that_is_set_back_is_refused(clean: Columns, tmp_path: Path) -
         read({**clean, "encoder": counts}, tmp_path)
 
 
-def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
+def test_levels_of_a_signal_are_no_steps_of_a_converter():
     time = np.arange(4000) / 4000
     assert resolution(np.where(np.sin(40 * time) > 0, 12.0, 6.0)) == 0
     assert resolution(np.select([time < 0.2, time < 0.7], [3.0, 5.0], 9.0)) == 0
@@ -214,13 +210,13 @@ def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
     assert resolution(np.rint(10 * np.sin(20 * time)) * 0.5) == pytest.approx(0.5)
 
 
-def test_a_file_may_have_a_zero_of_its_own(clean: Columns, tmp_path: Path) -> None:
+def test_a_file_may_have_a_zero_of_its_own(clean, tmp_path):
     """The encoder was mounted 20° further in the second file; the first keeps the zero of `angle`."""
     moved = {**clean, "deg": (clean["deg"] - 20) % 360}
     for name, columns in (("first.csv", clean), ("second.csv", moved)):
         (tmp_path / name).write_text(text_of(columns), "utf-8")
     stated = mapping({"angle": {"from": "column", "column": "deg", "unit": "deg"}})
-    files: list[dict[str, Any]] = [{"file": "first.csv"}, {"file": "second.csv", "angle": {"zero": "20 deg"}}]
+    files = [{"file": "first.csv"}, {"file": "second.csv", "angle": {"zero": "20 deg"}}]
     path = tmp_path / "rig.json"
     path.write_text(json.dumps({**stated, "files": files}), "utf-8")
     found = read_measured(path)
@@ -232,7 +228,7 @@ def test_a_file_may_have_a_zero_of_its_own(clean: Columns, tmp_path: Path) -> No
     assert off(read_measured(path).conditions[1]) > 1.0
 
 
-def test_zero_of_an_unloaded_stretch(tmp_path: Path) -> None:
+def test_zero_of_an_unloaded_stretch(tmp_path):
     """Its uncertainty is that of the mean of samples that depend on each other."""
     rng = np.random.default_rng(5)
     columns = recorded(noise=0.0)
@@ -246,7 +242,7 @@ def test_zero_of_an_unloaded_stretch(tmp_path: Path) -> None:
     assert accuracy.gain == pytest.approx(0.001)
 
 
-def test_filter_keeps_gaps(clean: Columns, tmp_path: Path) -> None:
+def test_filter_keeps_gaps(clean, tmp_path):
     """Nothing is carried over a long gap, short ones are bridged, and all stay gaps."""
     columns = {**clean, "T1": clean["T1"].copy()}
     columns["T1"][5000:5400] = np.nan
@@ -257,7 +253,7 @@ def test_filter_keeps_gaps(clean: Columns, tmp_path: Path) -> None:
     assert off(one) < 0.03
 
 
-TOLD: list[tuple[dict[str, Any], set[str], str]] = [
+TOLD = [
     ({"angle/per_turn": 30}, {"data.rate.ratio"}, "1200 rpm, 2 times what 'speed-in' reads"),
     ({"angle/sign": -1, "channels/torque-in/zero": "50 mV"}, {"data.rate.ratio"}, "-600 rpm, -1 times"),
     ({"angle/index": {"column": "none"}}, {"data.index.none"}, "has no pulse"),
@@ -268,9 +264,7 @@ TOLD: list[tuple[dict[str, Any], set[str], str]] = [
 
 
 @pytest.mark.parametrize(("changes", "told", "what"), TOLD)
-def test_what_is_told_of_an_angle(
-    clean: Columns, tmp_path: Path, changes: dict[str, Any], told: set[str], what: str
-) -> None:
+def test_what_is_told_of_an_angle(clean, tmp_path, changes, told, what):
     columns = {**clean, "none": 0 * clean["t"], "angle [°]": np.degrees(clean["angle"])}
     try:
         findings = read(columns, tmp_path, changes).findings

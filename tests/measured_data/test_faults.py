@@ -1,28 +1,23 @@
 """Every fault of a recording is named, with channel, figure and remedy, and a sound recording has none."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
-from measured_data.recording import Columns, codes, off, read, recorded
+from measured_data.recording import codes, off, read, recorded
 from trunnion.errors import MechanismError, Severity
 
 
 @pytest.fixture(scope="module")
-def sound() -> Columns:
+def sound():
     return recorded()
 
 
 @pytest.fixture
-def run(sound: Columns) -> Columns:
+def run(sound):
     return {name: values.copy() for name, values in sound.items()}
 
 
-def test_a_sound_recording_has_no_finding(run: Columns, tmp_path: Path) -> None:
+def test_a_sound_recording_has_no_finding(run, tmp_path):
     found = read(run, tmp_path)
     assert found.findings == ()
     (one,) = found.conditions
@@ -32,47 +27,47 @@ def test_a_sound_recording_has_no_finding(run: Columns, tmp_path: Path) -> None:
     assert found.done[0].startswith("19 whole turns; rows before")
 
 
-def _cells(run: Columns) -> None:
+def _cells(run):
     run["T1"][5000:5200] = np.nan
     run["T1"][6000] = np.inf
 
 
-def _spikes(run: Columns) -> None:
+def _spikes(run):
     run["T1"][[4100, 5250, 7001]] += 5  # at 0.2, 0.5 and 0 of a turn
 
 
-def _stuck(run: Columns) -> None:
+def _stuck(run):
     run["T1"][5000:5400] = run["T1"][5000]
 
 
-def _drift(run: Columns) -> None:
+def _drift(run):
     run["T1"] += 0.05 * run["t"]
 
 
-def _gap(run: Columns) -> None:
+def _gap(run):
     keep = np.r_[0:5000, 5300 : run["t"].size]
     for name in run:
         run[name] = run[name][keep]
 
 
-def _repeated(run: Columns) -> None:
+def _repeated(run):
     run["t"][5000:5003] = run["t"][5000]
 
 
-def _blank(run: Columns) -> None:
+def _blank(run):
     for values in run.values():
         values[[3000, 5000, 5001, -2, -1]] = np.nan
 
 
-def _backward(run: Columns) -> None:
+def _backward(run):
     run["t"][6000:] -= 0.02
 
 
-def _unsteady(run: Columns) -> None:
+def _unsteady(run):
     run["t"] = run["t"] + 0.02 * run["t"] ** 2
 
 
-FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
+FAULTS = [
     (_cells, "channels.torque-in", ("dropouts: 201 cells", "at 1, 1.2 s"), "cable"),
     (_spikes, "channels.torque-in", ("spikes: 3 readings", "0.82, 1.05, 1.4002 s"), "shielding"),
     (_stuck, "channels.torque-in", ("stuck: 399 readings", "at 1.0002 s"), "sensor"),
@@ -85,7 +80,7 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
 ]
 
 
-def test_a_narrow_peak_of_the_signal_is_no_spike(run: Columns, tmp_path: Path) -> None:
+def test_a_narrow_peak_of_the_signal_is_no_spike(run, tmp_path):
     """Narrower than the samples lie apart, so that few turns have a reading on it, in the same place of each."""
     run["T1"][[4000, 5001, 7000, 8001]] += 5
     assert read(run, tmp_path).findings == ()
@@ -93,9 +88,7 @@ def test_a_narrow_peak_of_the_signal_is_no_spike(run: Columns, tmp_path: Path) -
 
 @pytest.mark.spread(7)
 @pytest.mark.parametrize(("spoil", "where", "figures", "remedy"), FAULTS, ids=[one[0].__name__ for one in FAULTS])
-def test_faults_are_named(
-    run: Columns, tmp_path: Path, spoil: Any, where: str, figures: tuple[str, ...], remedy: str
-) -> None:
+def test_faults_are_named(run, tmp_path, spoil, where, figures, remedy):
     spoil(run)
     found = read(run, tmp_path)
     named = [one for one in found.findings if one.where == where and all(text in one.what for text in figures)]
@@ -107,7 +100,7 @@ def test_faults_are_named(
         assert off(found.conditions[0]) < 0.12
 
 
-def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
+def test_clipped_at_the_range(run, tmp_path):
     """A few readings are left out; of a range that nearly all exceed, as of a unit taken for another, nothing is."""
     with pytest.raises(MechanismError) as refused:
         read(run, tmp_path, {"channels/torque-in/range": "24 mN m"})
@@ -121,7 +114,7 @@ def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("code", [99999.0, -187.3])
-def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Path, code: float) -> None:
+def test_a_code_for_an_overload_changes_nothing_else(run, tmp_path, code):
     """Neither the steps that the readings tell nor an uncertainty; it is no end of a range."""
     run["T2"] = np.round(run["T2"] / 0.2) * 0.2
     sound = read(run, tmp_path).conditions[0].courses["brake"].accuracy
@@ -141,9 +134,7 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
 @pytest.mark.parametrize("rate", [400.0, 5000.0])  # a cubic between samples, and means of them
 @pytest.mark.parametrize("changes", [{}, {"channels/torque-in/range": "30 N m"}], ids=["spikes", "range"])
 @pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "100 Hz", "order": 2}}], ids=["plain", "filtered"])
-def test_a_bad_reading_beside_the_turns_does_not_reach_into_them(
-    tmp_path: Path, rate: float, changes: dict[str, Any], low_pass: dict[str, Any]
-) -> None:
+def test_a_bad_reading_beside_the_turns_does_not_reach_into_them(tmp_path, rate, changes, low_pass):
     """In the last rows before the first turn, the first ones of it, and about the end of the last one."""
     run = recorded(rate=rate, turns=8.5)
     angle = run["angle"] / (2 * np.pi)
@@ -158,7 +149,7 @@ def test_a_bad_reading_beside_the_turns_does_not_reach_into_them(
         assert any("left out" in one.what for one in found.findings), row - first
 
 
-def test_a_spike_in_an_unloaded_stretch_does_not_move_the_zero(run: Columns, tmp_path: Path) -> None:
+def test_a_spike_in_an_unloaded_stretch_does_not_move_the_zero(run, tmp_path):
     run["T1"][300] = 9999.0
     found = read(run, tmp_path)
     (one,) = found.findings
@@ -167,7 +158,7 @@ def test_a_spike_in_an_unloaded_stretch_does_not_move_the_zero(run: Columns, tmp
     assert off(found.conditions[0]) < 0.06
 
 
-def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
+def test_coarse_readings_are_no_faults(run, tmp_path):
     """A signal of a few dozen levels stays long on each, and long at its largest."""
     for name in ("T1", "T2"):
         run[name] = np.rint(run[name] / 0.02) * 0.02
@@ -177,7 +168,7 @@ def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("turns", [2, 3, 20])
-def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: Path, turns: int) -> None:
+def test_what_comes_back_every_turn_is_the_signals_own(run, tmp_path, turns):
     """A load that works over half a turn, without noise, is zero or constant there and steps."""
     phase = run["angle"] % (2 * np.pi)
     run["T2"] = np.where(run["t"] < 0.2, 0.0, np.where(phase < 2, 30.0 + np.sin(phase), 0.0))
@@ -197,7 +188,7 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
         ("T2", "brake", "negative in 19 of 19 turns"),
     ],
 )
-def test_wrong_signs(run: Columns, tmp_path: Path, column: str, channel: str, figures: str) -> None:
+def test_wrong_signs(run, tmp_path, column, channel, figures):
     run[column] *= -1
     (one,) = read(run, tmp_path).findings
     assert one.where == f"channels.{channel}"
@@ -207,7 +198,7 @@ def test_wrong_signs(run: Columns, tmp_path: Path, column: str, channel: str, fi
 
 
 @pytest.mark.parametrize("zero", [["0 s", "0.19 s"], ["-20 s", "0.19 s"]])
-def test_drift_is_removed_from_when_the_zero_was_read(run: Columns, tmp_path: Path, zero: list[str]) -> None:
+def test_drift_is_removed_from_when_the_zero_was_read(run, tmp_path, zero):
     """Also of a stretch that is stated far longer than the file has it before."""
     run["T1"] += 0.05 * (run["t"] - 0.1)
     found = read(run, tmp_path, {"channels/torque-in/zero": {"over": zero}, "drift": "remove"})
@@ -216,7 +207,7 @@ def test_drift_is_removed_from_when_the_zero_was_read(run: Columns, tmp_path: Pa
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
 
 
-def test_lost_pulses_by_the_index(run: Columns, tmp_path: Path) -> None:
+def test_lost_pulses_by_the_index(run, tmp_path):
     run["z"] = (run["angle"] / (2 * np.pi) % 1 < 0.02) * 1.0
     changes = {"angle/index": {"column": "z"}}
     assert read(run, tmp_path, changes).findings == ()
@@ -231,7 +222,7 @@ def test_lost_pulses_by_the_index(run: Columns, tmp_path: Path) -> None:
     assert off(found.conditions[0]) < 0.06
 
 
-def test_sampling_too_slow(run: Columns, tmp_path: Path) -> None:
+def test_sampling_too_slow(run, tmp_path):
     thin = {name: values[::100] for name, values in run.items()}
     assert "data.sampling.slow" in codes(read(thin, tmp_path))
     with pytest.raises(MechanismError, match=r"sampling is too slow for the filter: 50 Hz, a cut-off of 40 Hz"):

@@ -1,10 +1,5 @@
 """Files as a German laboratory exports them: thousands with a point, units in the headings, a crank angle in steps."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,11 +8,11 @@ from trunnion.rig.reading.read import read_measured
 RATE, SPEED = 500.0, 300.0  # Hz, rpm
 
 
-def german(value: float, decimals: int) -> str:
+def german(value, decimals):
     return f"{value:,.{decimals}f}".replace(",", "'").replace(".", ",").replace("'", ".")
 
 
-def recorded(folder: Path, header: str, step: float = 0.5, rows: int = 3000) -> dict[str, Any]:
+def recorded(folder, header, step=0.5, rows=3000):
     """Angle in steps, a torque of 1450 + 200 sin N m, a speed; the mapping that reads them, without units."""
     noise = np.random.default_rng(1).normal(size=rows)
     lines = [header]
@@ -51,7 +46,7 @@ def recorded(folder: Path, header: str, step: float = 0.5, rows: int = 3000) -> 
         "Zeit / ms;Winkel / °;Moment / N m;Drehzahl / U/min|",  # wanted whole
     ],
 )
-def test_units_of_headings_and_thousands(tmp_path: Path, header: str) -> None:
+def test_units_of_headings_and_thousands(tmp_path, header):
     mapping = recorded(tmp_path, header.strip("|"))
     if "|" in header:
         mapping["time"]["column"], mapping["angle"]["column"] = "Zeit / ms", "Winkel / °"

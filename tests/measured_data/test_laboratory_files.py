@@ -1,19 +1,12 @@
 """Files as laboratories write them: time stamps, German signs and units, long headers, tables that unfold."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
-from measured_data.recording import Columns, mapping, off, recorded, text_of
+from measured_data.recording import mapping, off, recorded, text_of
 from trunnion.errors import MechanismError
-from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.tables import Column, read_table
 
@@ -24,32 +17,32 @@ ChannelObject, RootObject, TdmsWriter = (
 
 
 @pytest.fixture(scope="module")
-def columns() -> Columns:
+def columns():
     return recorded(turns=6, noise=0.0)
 
 
 def _read(
-    columns: Columns,
-    folder: Path,
-    changes: dict[str, Any],
-    names: dict[str, str] | None = None,
-    encoding: str = "utf-8",
-) -> Measurement:
+    columns,
+    folder,
+    changes,
+    names=None,
+    encoding="utf-8",
+):
     """As a German logger writes it: semicolons and decimal commas."""
     text = text_of({(names or {}).get(name, name): one for name, one in columns.items()}, ";", ",")
     (folder / "run.csv").write_bytes(text.encode(encoding))
     return read_measured(mapping(changes), [folder / "run.csv"])
 
 
-def _stamps(columns: Columns, form: Callable[[float], str]) -> Columns:
+def _stamps(columns, form):
     return {**columns, "t": [form(t) for t in columns["t"]]}
 
 
-def _part(t: float) -> str:
+def _part(t):
     return f"{round(t * 1e4) % 10_000:04d}"
 
 
-FORMS: dict[str, Callable[[float], str]] = {
+FORMS = {
     "date, decimal comma": lambda t: f"22.11.2026 11:40:{int(t):02d},{_part(t)}",
     "world time": lambda t: f"2026-11-22T11:40:{int(t):02d}.{_part(t)}Z",
     "time of day": lambda t: f"11:40:{int(t):02d},{_part(t)}",
@@ -62,7 +55,7 @@ FORMS: dict[str, Callable[[float], str]] = {
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("unit", ["", " [hh:mm:ss]"])
-def test_time_stamps(columns: Columns, tmp_path: Path, form: str, unit: str) -> None:
+def test_time_stamps(columns, tmp_path, form, unit):
     changes = {"time": {"column": "t"}}
     found = _read(_stamps(columns, FORMS[form]), tmp_path, changes, {"t": f"t{unit}"})
     plain = _read(columns, tmp_path, {})
@@ -72,7 +65,7 @@ def test_time_stamps(columns: Columns, tmp_path: Path, form: str, unit: str) -> 
         np.testing.assert_allclose(found.conditions[0].courses[name].mean, course.mean, rtol=1e-9)
 
 
-def test_time_stamps_keep_their_last_digit(tmp_path: Path) -> None:
+def test_time_stamps_keep_their_last_digit(tmp_path):
     """Seconds since a year as floats are known to some microseconds only."""
     (tmp_path / "a.csv").write_text(
         "t;x\n22.11.2026 11:40:00,000000100;1\n22.11.2026 11:40:00,000000300;2\n;3\n", encoding="utf-8"
@@ -91,13 +84,13 @@ def test_time_stamps_keep_their_last_digit(tmp_path: Path) -> None:
         (("4.3.26 11:40:00", "5.3.26 11:40:00,5"), True, 86400.5),
     ],
 )
-def test_the_order_of_a_date(stamps: tuple[str, ...], dayfirst: bool, seconds: float) -> None:
+def test_the_order_of_a_date(stamps, dayfirst, seconds):
     """The day comes first unless the year does, or the mapping says otherwise."""
     assert Column(np.zeros(2), "", 2, stamps[0], stamps).seconds(dayfirst)[1] == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
-def test_units_of_a_german_laboratory(columns: Columns, tmp_path: Path, encoding: str) -> None:
+def test_units_of_a_german_laboratory(columns, tmp_path, encoding):
     lines = text_of(columns, ";", ",").split("\n", 1)[1]
     head = "Prüfzeit;T1;T2;n1;n2;Drehgeber;Winkel\nSek.;V;Nm;1/min;U/min;-;°\n"
     (tmp_path / "run.csv").write_bytes((head + lines).encode(encoding))
@@ -115,7 +108,7 @@ def test_units_of_a_german_laboratory(columns: Columns, tmp_path: Path, encoding
 
 
 @pytest.mark.parametrize("end", ["parquet", "tdms", "nc"])
-def test_time_stamps_of_binary_files(columns: Columns, tmp_path: Path, end: str) -> None:
+def test_time_stamps_of_binary_files(columns, tmp_path, end):
     stamped, path = _stamps(columns, FORMS["date, decimal comma"]), tmp_path / f"run.{end}"
     if end == "parquet":
         pd.DataFrame(stamped).to_parquet(path)
@@ -132,7 +125,7 @@ UNKNOWN = [("time", "t", "Sekunde"), ("time", "t", "hh:mm:ss"), ("angle", "angle
 
 
 @pytest.mark.parametrize(("entry", "column", "unit"), UNKNOWN)
-def test_a_unit_that_is_unknown(columns: Columns, tmp_path: Path, entry: str, column: str, unit: str) -> None:
+def test_a_unit_that_is_unknown(columns, tmp_path, entry, column, unit):
     """It is refused, unless the mapping states it."""
     changes = {"time": {"column": "t"}, "angle": {"from": "column", "column": "angle"}}
     units = {"t": "t [s]", "angle": "angle [rad]"}

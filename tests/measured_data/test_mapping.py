@@ -1,16 +1,12 @@
 """The mapping file: strict, with file and line, all that is wrong in one go; units either way round."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from manual.conftest import Run, program
-from measured_data.recording import Columns, mapping, off, read, recorded, text_of
+from manual.conftest import program
+from measured_data.recording import mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import read_mapping
@@ -21,7 +17,7 @@ __all__ = ["program"]  # a fixture
 
 
 @pytest.fixture(scope="module")
-def columns() -> Columns:
+def columns():
     return recorded(turns=5, noise=0.0)
 
 
@@ -51,7 +47,7 @@ drift: maybe
 """
 
 
-def test_everything_at_once_with_its_line(tmp_path: Path) -> None:
+def test_everything_at_once_with_its_line(tmp_path):
     path = tmp_path / "m.yaml"
     path.write_text(WRONG, encoding="utf-8")
     with pytest.raises(MechanismError) as failure:
@@ -81,7 +77,7 @@ def test_everything_at_once_with_its_line(tmp_path: Path) -> None:
     assert "state the gain, such as 100 mV/(N m)" in found[12].remedy
 
 
-CHANGES: list[tuple[dict[str, Any], str, str]] = [
+CHANGES = [
     ({"trunnion-data": 2}, "trunnion-data", "version 2"),
     ({"trunnion-data": None}, "", "'trunnion-data' is missing"),
     ({"channels": {}}, "channels", "at least 1"),
@@ -112,7 +108,7 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
 
 
 @pytest.mark.parametrize(("changes", "where", "told"), CHANGES, ids=[f"{k}" for k in range(len(CHANGES))])
-def test_what_a_mapping_cannot_say(changes: dict[str, Any], where: str, told: str) -> None:
+def test_what_a_mapping_cannot_say(changes, where, told):
     with pytest.raises(MechanismError) as failure:
         read_mapping(mapping(changes))
     assert [one.where for one in failure.value.findings] == [where]
@@ -121,7 +117,7 @@ def test_what_a_mapping_cannot_say(changes: dict[str, Any], where: str, told: st
 
 
 @pytest.mark.parametrize("name", ["../run.csv", "/run.csv", "a/../../run.csv", "link/run.csv"])
-def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns) -> None:
+def test_only_files_below_its_folder(tmp_path, name, columns):
     """A mapping is data from a stranger, and so is a link beside it; the command line may name any file."""
     (tmp_path / "inner").mkdir()
     (tmp_path / "inner" / "link").symlink_to(tmp_path)
@@ -132,7 +128,7 @@ def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns
         read_measured(path)
 
 
-def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Columns) -> None:
+def test_files_of_the_command_line_keep_what_was_set(tmp_path, columns):
     """By the file, else by its name."""
     with pytest.raises(MechanismError, match="no data file is named"):
         read_measured(mapping())
@@ -142,7 +138,7 @@ def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Co
     path, files = tmp_path / "m.json", [{"file": "run.csv", "set": {"beta": "15 deg"}}, {"file": "two.csv"}]
     path.write_text(json.dumps(mapping({"files": files, "set": {"gamma": "1 deg"}})), encoding="utf-8")
 
-    def read_(*names: str) -> list[dict[str, float]]:
+    def read_(*names):
         return [dict(one.values) for one in read_measured(path, [tmp_path / name for name in names]).conditions]
 
     beta, gamma = {"beta": pytest.approx(np.radians(15))}, {"gamma": pytest.approx(np.radians(1))}
@@ -152,7 +148,7 @@ def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Co
     assert read_("elsewhere/two.csv", "new.csv") == [gamma] * 2  # nothing is stated of them
 
 
-UNITS: list[dict[str, Any]] = [
+UNITS = [
     {"unit": "V", "gain": "100 mV/(N m)"},
     {"unit": "V", "gain": "0.1 V/N/m"},
     {"unit": "V", "gain": "10 N m/V"},
@@ -170,7 +166,7 @@ UNITS: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("stated", UNITS, ids=[str(one) for one in UNITS])
-def test_units_and_gains(tmp_path: Path, columns: Columns, stated: dict[str, Any]) -> None:
+def test_units_and_gains(tmp_path, columns, stated):
     stated = dict(stated)
     changed = dict(columns)
     if stated.pop("scale", None):
@@ -181,7 +177,7 @@ def test_units_and_gains(tmp_path: Path, columns: Columns, stated: dict[str, Any
     assert off(found.conditions[0]) < 0.05
 
 
-def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
+def test_units_of_the_file(tmp_path, columns):
     """The mapping's unit is taken; one of the file serves where it has none; where both differ it is told."""
     named = {("n1 [rpm]" if name == "n1" else name): values for name, values in columns.items()}
     one = read(named, tmp_path, {"channels/speed-in/unit": None})
@@ -198,9 +194,7 @@ def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
 
 @pytest.mark.parametrize("stated", [{"range": "20 N m"}, {"accuracy": {"zero": "2 N m"}}, {"resolution": "1 N m"}])
 @pytest.mark.parametrize("unit", [None, "N"])
-def test_an_amount_in_another_unit_than_its_column_is_refused(
-    tmp_path: Path, columns: Columns, stated: dict[str, Any], unit: str | None
-) -> None:
+def test_an_amount_in_another_unit_than_its_column_is_refused(tmp_path, columns, stated, unit):
     """Whether in the file or in the mapping the unit stands; of two files it is told once."""
     named = {("T2 [N]" if name == "T2" else name): values for name, values in columns.items()}
     files = [tmp_path / "a.csv", tmp_path / "b.csv"]
@@ -213,7 +207,7 @@ def test_an_amount_in_another_unit_than_its_column_is_refused(
     assert ("2 such findings: a.csv, b.csv" in one.what) == (unit is None)
 
 
-def test_schema(program: Run) -> None:
+def test_schema(program):
     """The JSON Schema takes a mapping that the program takes, and has its keys."""
     jsonschema = pytest.importorskip("jsonschema")
     code, text, _ = program("schema", "--of", "data")
@@ -230,7 +224,7 @@ SHEETS = {"1 V/(1000 rpm)": "1 mV/rpm", "20 mA/(100 N m)": "0.2 mA/(N m)", "10 V
 
 
 @pytest.mark.parametrize("text", SHEETS)
-def test_gains_as_data_sheets_have_them(text: str) -> None:
+def test_gains_as_data_sheets_have_them(text):
     first, second = read_amount(text), read_amount(SHEETS[text])
     assert first.value == pytest.approx(second.value, rel=1e-12)
     assert first.dimensions == second.dimensions
@@ -239,6 +233,6 @@ def test_gains_as_data_sheets_have_them(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["ft-lb", "ft lb", "lb-ft", "lbf-ft", "ft·lbf", "ft-lbs", "lb ft", "ft.lb", "ftlb"])
-def test_pound_feet_as_they_are_written(text: str) -> None:
+def test_pound_feet_as_they_are_written(text):
     factor, exponents = dimensions(text)
     assert (factor, exponents) == (pytest.approx(1.3558179483314003), dimensions("N m")[1])

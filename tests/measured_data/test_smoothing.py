@@ -1,7 +1,5 @@
 """Pulses that are known to a sample: what the smoothest values that agree with them are off."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,13 +13,13 @@ Array = NDArray[np.float64]
 STEP = 1 / 5000
 
 
-def sampled(times: Array) -> Array:
+def sampled(times):
     """In the middle between the two samples that a pulse lies between."""
     return np.asarray((np.floor(times / STEP) + 0.5) * STEP)
 
 
 @pytest.mark.parametrize(("per_turn", "rate"), [(360, 5.0), (360, 10.0), (60, 5.0), (60, 15.167), (100, 10.0)])
-def test_steady_pulses_in_step_with_the_sampling(per_turn: int, rate: float) -> None:
+def test_steady_pulses_in_step_with_the_sampling(per_turn, rate):
     """What is left is a shift of all pulses alike, and as large as it is said to be at most; exactly 5 samples a pulse
     leave half a sample.
     """
@@ -37,7 +35,7 @@ def test_steady_pulses_in_step_with_the_sampling(per_turn: int, rate: float) -> 
 @pytest.mark.parametrize(
     ("count", "width", "order"), [(5, 5, 3), (200, 21, 3), (3000, 721, 3), (721, 721, 3), (50, 7, 0)]
 )
-def test_local_polynomials_are_those_of_scipy(count: int, width: int, order: int) -> None:
+def test_local_polynomials_are_those_of_scipy(count, width, order):
     from scipy.signal import savgol_filter
 
     values = np.cumsum(np.random.default_rng(count).normal(size=count))
@@ -46,7 +44,7 @@ def test_local_polynomials_are_those_of_scipy(count: int, width: int, order: int
 
 
 @pytest.mark.parametrize("per_sample", [0.97, 1.01, 1.2, 1.5, 2.4])
-def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
+def test_a_count_about_as_fast_as_the_sampling(per_sample):
     """A running count of 1.2 a sample steps by 1, 1, 1, 1, 2: the angle is right to a small part of a count."""
     per_turn, samples = 360, 20_000
     time = STEP * np.arange(samples)
@@ -60,7 +58,7 @@ def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
     assert np.ptp(off) < 0.15
 
 
-def test_uneven_running_stays() -> None:
+def test_uneven_running_stays():
     """A ripple of the speed of 3 % twice a turn is the shaft's: it is followed to a fraction of a sample."""
     angle = np.arange(0, 40 * np.pi, np.pi / 180)
     true = (angle + 0.03 * np.sin(2 * angle) / 2) / (2 * np.pi * 5) + 0.1
@@ -72,7 +70,7 @@ def test_uneven_running_stays() -> None:
 
 
 @pytest.mark.parametrize("width", [0.2, 0.6])
-def test_an_index_narrower_than_a_sample(width: float) -> None:
+def test_an_index_narrower_than_a_sample(width):
     """Seen in some turns only; the edges are right in the mean."""
     true = 0.05 + np.arange(4000) * 0.100013
     first = np.ceil(true / STEP) * STEP

@@ -1,10 +1,6 @@
 """The error by steps that all turns repeat, against readings that are rounded one by one; the steps of a channel."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +9,6 @@ from scipy.special import ndtr
 
 from measured_data.four_bar import rocker
 from trunnion.rig.reading import turns as steps
-from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.turns import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
 
@@ -21,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.1, 0.25, 0.4])
-def test_what_rounding_leaves_of_a_mean(noise: float) -> None:
+def test_what_rounding_leaves_of_a_mean(noise):
     random = np.random.default_rng(1)
     true = random.uniform(0, 1, 20_000)
     off = np.rint(true + noise * random.normal(size=(100, true.size))) - true
@@ -31,7 +26,7 @@ def test_what_rounding_leaves_of_a_mean(noise: float) -> None:
     assert noise_before(within**0.5) == pytest.approx(noise, rel=0.03, abs=1e-3)
 
 
-def rounded_mean(true: Array, noise: float) -> Array:
+def rounded_mean(true, noise):
     """Mean of true + noise, rounded to whole numbers: by the chances of each."""
     steps = np.arange(np.floor(true.min()) - 3, np.ceil(true.max()) + 3)
     return np.asarray(steps[0] + np.sum(ndtr((true[:, None] - steps - 0.5) / noise), axis=1))
@@ -40,7 +35,7 @@ def rounded_mean(true: Array, noise: float) -> Array:
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("samples", [250.0, 2000.0])  # interpolated, and means of some
 @pytest.mark.parametrize("noise", [0.05, 0.25])
-def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, noise: float) -> None:
+def test_errors_of_samples_that_gain_whole_steps_are_alike(samples, noise):
     """About its steepest place the course gains one step from sample to sample, or an eighth, and the errors add up."""
     positions, random = 180, np.random.default_rng(2)
     turn = np.arange(positions) / positions
@@ -63,7 +58,7 @@ def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, noise
         assert told[0, 0] > 4 * np.sum(columns[0] ** 2) * left_of_steps(noise) / 12
 
 
-MAPPING: dict[str, Any] = {
+MAPPING = {
     "trunnion-data": 1,
     "time": {"column": "t", "unit": "s"},
     "angle": {"from": "column", "column": "phi", "unit": "deg"},
@@ -71,21 +66,21 @@ MAPPING: dict[str, Any] = {
 }
 
 
-def recorded(path: Path, time: Array, angle: Array, psi: Array, decimals: int = 3, **changes: Any) -> Measurement:
+def recorded(path, time, angle, psi, decimals=3, **changes):
     """Times, s, angles of the crank, rad, and readings of the rocker, deg, as a file that is read."""
     rows = zip(time, np.degrees(angle) % 360, psi, strict=True)
     path.write_text("\n".join(["t;phi;psi", *(f"{t:.6f};{a:.6f};{x:.{decimals}f}" for t, a, x in rows)]))
     return read_measured(MAPPING | changes, [path])
 
 
-def repeated(path: Path, values: Array, decimals: int) -> Measurement:
+def repeated(path, values, decimals):
     """`values`, deg, of a turn that all twelve repeat, at 60 rpm."""
     place = np.arange(13 * values.size)
     return recorded(path, place / values.size, 2 * np.pi * place / values.size, np.resize(values, place.size), decimals)
 
 
 @pytest.mark.parametrize(("rpm", "noise", "same"), [(60, 0.2, True), (60, 0.0, True), (59.1, 0.2, False)])
-def test_turns_that_are_sampled_at_the_same_places(tmp_path: Path, rpm: float, noise: float, same: bool) -> None:
+def test_turns_that_are_sampled_at_the_same_places(tmp_path, rpm, noise, same):
     """What is said to be uncertain in the mean of a position is what it is off by, whatever repeats of it."""
     time = np.arange(int(14 * 60 / rpm * 200)) / 200  # at 60 rpm all turns are sampled at the same places
     angle = rpm * np.pi / 30 * time + 1
@@ -101,11 +96,11 @@ def test_turns_that_are_sampled_at_the_same_places(tmp_path: Path, rpm: float, n
     assert np.std(off) == pytest.approx(float(np.sqrt(np.mean(own**2))), rel=0.25)
 
 
-def test_turns_shorter_than_half_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_turns_shorter_than_half_a_row(monkeypatch):
     """Readings ±½ in turn scatter by ½: row differences of ±1 have √(1/2) = σ, and steps take 1/12 of its square."""
     monkeypatch.setattr(steps, "in_step", lambda *_: 1.0)
     rows, times = np.ones(100, dtype=bool), np.arange(10.0)
-    short: Any = SimpleNamespace(begin=times, end=times + 0.2, line=SimpleNamespace(step=1.0), rows=rows)
+    short = SimpleNamespace(begin=times, end=times + 0.2, line=SimpleNamespace(step=1.0), rows=rows)
     left = steps.left_in_turns(short, np.zeros((10, 4)), np.arange(100) % 2 - 0.5, 0.0)
     assert left.noise == pytest.approx((1 / 2 - 1 / 12) ** 0.5, rel=1e-3)
 
@@ -116,7 +111,7 @@ TURN = np.radians(360 * np.arange(1000) / 1000)
 @pytest.mark.spread(6)
 @pytest.mark.parametrize("samples", [20, 200, 1000, 4000])
 @pytest.mark.parametrize("step", [0.001, 0.1, 0.5, 2.0, 20 / 2**7])
-def test_steps_count_where_turns_repeat(tmp_path: Path, step: float, samples: int) -> None:
+def test_steps_count_where_turns_repeat(tmp_path, step, samples):
     """Each reading is off by what is rounded, all by what may be cut off: step/√12 each (GUM F.2.2.1)."""
     true = np.degrees(rocker(TURN[:: 1000 // samples] if samples <= 1000 else np.arange(4000) * np.pi / 2000))
     found = repeated(tmp_path / "a.csv", np.floor(true / step) * step, 6)
@@ -129,7 +124,7 @@ def test_steps_count_where_turns_repeat(tmp_path: Path, step: float, samples: in
         assert np.median(course.uncertainty) == pytest.approx(np.radians(step) / np.sqrt(6.0), rel=1e-3)
 
 
-def test_a_channel_has_one_step_of_all_its_files(tmp_path: Path) -> None:
+def test_a_channel_has_one_step_of_all_its_files(tmp_path):
     """One file spans three steps, and by itself hardly shows them; the other many."""
     psi = np.degrees(rocker(TURN[::2]))
     few = 100 + 0.15 * (psi - psi.min()) / np.ptp(psi)

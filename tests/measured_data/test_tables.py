@@ -1,11 +1,5 @@
 """Data files of every kind and shape: the same numbers from each of them; a finding for what is no data."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +7,6 @@ import xarray as xr
 
 from measured_data.recording import mapping, read, recorded
 from trunnion.errors import MechanismError
-from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.tables import read_table
 
@@ -24,7 +17,7 @@ ChannelObject, RootObject, TdmsWriter = (
 )
 
 
-def _tdms(path: Path, columns: Mapping[str, Any], properties: Mapping[str, Any] | None = None) -> None:
+def _tdms(path, columns, properties=None):
     with TdmsWriter(path) as writer:
         channels = [
             ChannelObject("rig", name, np.asarray(one), dict(properties or {})) for name, one in columns.items()
@@ -32,7 +25,7 @@ def _tdms(path: Path, columns: Mapping[str, Any], properties: Mapping[str, Any] 
         writer.write_segment([RootObject({}), *channels])
 
 
-def _same(one: Measurement, other: Measurement) -> bool:
+def _same(one, other):
     return all(
         np.array_equal(a.turns, b.turns, equal_nan=True) and a.accuracy == b.accuracy
         for left, right in zip(one.conditions, other.conditions, strict=True)
@@ -40,7 +33,7 @@ def _same(one: Measurement, other: Measurement) -> bool:
     )
 
 
-def test_formats_give_the_same_bits(tmp_path: Path) -> None:
+def test_formats_give_the_same_bits(tmp_path):
     columns = recorded(turns=6, noise=0.3)
     columns["T1"][3000:3050] = np.nan
     columns["T2"][2000] = np.inf
@@ -57,7 +50,7 @@ def test_formats_give_the_same_bits(tmp_path: Path) -> None:
         assert [one.what for one in found.findings] == [one.what for one in text.findings]
 
 
-TEXTS: dict[str, str] = {
+TEXTS = {
     "comma": "t,T 1\n0,1.5\n1,-2e3\n",
     "semicolon and decimal comma": "t;T 1\n0;1,5\n1;-2e3\n",
     "tab": "t\tT 1\n0\t1.5\n1\t-2000\n",
@@ -82,7 +75,7 @@ TEXTS: dict[str, str] = {
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_shapes_of_text(tmp_path: Path, kind: str) -> None:
+def test_shapes_of_text(tmp_path, kind):
     path = tmp_path / "a.csv"
     path.write_text(TEXTS[kind], encoding="utf-8", newline="")
     found = read_table(path, ["t", "T 1"])
@@ -91,7 +84,7 @@ def test_shapes_of_text(tmp_path: Path, kind: str) -> None:
     assert found.columns["T 1"].unit == ("mV" if "units" in kind else "")
 
 
-def test_numbers_that_are_none(tmp_path: Path) -> None:
+def test_numbers_that_are_none(tmp_path):
     """Beside decimal commas a point may be one of thousands or of decimals: it makes no number."""
     path = tmp_path / "a.csv"
     path.write_text(
@@ -108,7 +101,7 @@ def test_numbers_that_are_none(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.values, [1.5, np.nan, 980.25])
 
 
-def test_waveforms_tell_time_and_unit(tmp_path: Path) -> None:
+def test_waveforms_tell_time_and_unit(tmp_path):
     columns = recorded(turns=5)
     columns.pop("t")
     properties = {"wf_increment": 1 / 5000.0, "wf_start_offset": 0.0, "wf_samples": 100}
@@ -121,7 +114,7 @@ def test_waveforms_tell_time_and_unit(tmp_path: Path) -> None:
     assert read_table(tmp_path / "unit.tdms", ["T1"]).columns["T1"].unit == "mV"
 
 
-def test_groups_of_tdms(tmp_path: Path) -> None:
+def test_groups_of_tdms(tmp_path):
     path = tmp_path / "two.tdms"
     with TdmsWriter(path) as writer:
         for group, name, values in (("in", "T", [1.0, 2.0]), ("out", "T", [3.0, 4.0]), ("out", "n", [5, 6])):
@@ -135,7 +128,7 @@ def test_groups_of_tdms(tmp_path: Path) -> None:
         read_table(path, ["a", "b"])
 
 
-def test_kinds_of_parquet(tmp_path: Path) -> None:
+def test_kinds_of_parquet(tmp_path):
     path = tmp_path / "a.parquet"
     fields = [
         pa.field("n", pa.int16(), metadata={"unit": "rpm"}),
@@ -153,7 +146,7 @@ def test_kinds_of_parquet(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("engine", ["scipy", "h5netcdf"])
-def test_variables_of_netcdf(tmp_path: Path, engine: Any) -> None:
+def test_variables_of_netcdf(tmp_path, engine):
     """Packed numbers, gaps, units and times are those that CF 1.11 makes of them; what is not named is not decoded."""
     path = tmp_path / "a.nc"
     packed = {"units": "N m", "scale_factor": 0.5, "_FillValue": np.int16(-99)}
@@ -182,7 +175,7 @@ def test_variables_of_netcdf(tmp_path: Path, engine: Any) -> None:
         read_table(path, ["n"])
 
 
-BAD: dict[str, tuple[str, bytes, str]] = {
+BAD = {
     "empty": ("a.csv", b"", "is empty but for comments"),
     "blank": ("a.csv", b"\n\n", "is empty but for comments"),
     "header only": ("a.csv", b"t,T1\n", "has a header but no rows"),
@@ -204,7 +197,7 @@ BAD: dict[str, tuple[str, bytes, str]] = {
 
 
 @pytest.mark.parametrize("kind", BAD)
-def test_what_is_no_data(tmp_path: Path, kind: str) -> None:
+def test_what_is_no_data(tmp_path, kind):
     name, content, told = BAD[kind]
     if kind != "no such file":
         (tmp_path / name).write_bytes(content)
@@ -216,7 +209,7 @@ def test_what_is_no_data(tmp_path: Path, kind: str) -> None:
     assert finding.remedy
 
 
-def test_huge_numbers(tmp_path: Path) -> None:
+def test_huge_numbers(tmp_path):
     columns = recorded(turns=4)
     columns["T1"] *= 1e150
     found = read(columns, tmp_path)

@@ -1,10 +1,7 @@
 """`trunnion data` as a user meets it: tables, files, findings, and nothing half-written."""
 
-from __future__ import annotations
-
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,7 +9,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from manual.conftest import Run, program
+from manual.conftest import program
 from measured_data.recording import mapping, recorded, text_of
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import dataset
@@ -22,7 +19,7 @@ __all__ = ["program"]  # a fixture
 
 
 @pytest.fixture
-def rig(tmp_path: Path) -> Path:
+def rig(tmp_path):
     (tmp_path / "a.csv").write_text(text_of(recorded()), "utf-8")
     entry = {"file": "a.csv", "set": {"beta": "15 deg"}}
     text = json.dumps(mapping({"files": [entry], "set": {"input.speed": {"mean": "speed-in"}}}))
@@ -30,7 +27,7 @@ def rig(tmp_path: Path) -> Path:
     return tmp_path / "rig.json"
 
 
-def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
+def test_tables_and_files(program, rig, tmp_path):
     for package in ("h5netcdf", "pyarrow"):
         pytest.importorskip(package)
     code, out, err = program(
@@ -64,7 +61,7 @@ def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
         assert json.loads(whole.attrs["measured"])[0] == "effort:input"
 
 
-def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
+def test_faults_and_bad_input(program, rig, tmp_path):
     columns = recorded()
     columns["T2"] *= -1
     (tmp_path / "b.csv").write_text(text_of(columns), "utf-8")
@@ -85,7 +82,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     assert "cannot be read" in err
 
 
-def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_path: Path) -> None:
+def test_results_are_not_written_over_what_is_read(program, rig, tmp_path):
     (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
     (tmp_path / "b.csv").write_bytes((tmp_path / "a.csv").read_bytes())
     before = {name: (tmp_path / name).read_bytes() for name in ("a.csv", "b.csv", "rig.json")}
@@ -97,7 +94,7 @@ def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_
     assert program("data", "rig.json", "b.csv", "--out", "a.csv").code == 0  # it is not read here
 
 
-def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
+def test_no_text_of_a_table_is_a_formula(tmp_path):
     """Names of conditions and of what was set come from files; a spreadsheet must not execute them."""
     path = tmp_path / "=cmd|calc!A1.csv"
     path.write_text(text_of(recorded(turns=3)), "utf-8")

@@ -1,22 +1,17 @@
 """What reading a text as a model file raises, and the model whose numbers vary in every way."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 from model_samples import VARIED
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.model.mechanism import Mechanism, read_mechanism
+from trunnion.errors import MechanismError
+from trunnion.model.mechanism import read_mechanism
 
 
 @pytest.fixture
-def findings_of(tmp_path: Path) -> Callable[..., tuple[Finding, ...]]:
+def findings_of(tmp_path):
     """The findings that reading a text as a file raises."""
 
-    def read(content: str | bytes, name: str = "model.yaml") -> tuple[Finding, ...]:
+    def read(content, name="model.yaml"):
         path = tmp_path / name
         path.write_bytes(content.encode() if isinstance(content, str) else content)
         with pytest.raises(MechanismError) as error:
@@ -28,7 +23,7 @@ def findings_of(tmp_path: Path) -> Callable[..., tuple[Finding, ...]]:
 
 
 @pytest.fixture
-def varied(tmp_path: Path) -> Mechanism:
+def varied(tmp_path):
     path = tmp_path / "varied.yaml"
     path.write_text(VARIED, encoding="utf-8")
     return read_mechanism(path)

@@ -1,11 +1,8 @@
 """Points of drivers and tables from CSV files, given beside a model or named in it: what is read, what is refused."""
 
-from __future__ import annotations
-
 import json
 import os
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,20 +18,20 @@ SLIDER_CRANK = Path(__file__).resolve().parents[2] / "examples" / "slider-crank.
 MODEL = read_mechanism(SLIDER_CRANK)
 
 
-def csv(tmp_path: Path, text: str, name: str = "points.csv") -> Path:
+def csv(tmp_path, text, name="points.csv"):
     path = tmp_path / name
     path.write_text(text, encoding="utf-8", newline="")
     return path
 
 
-def points(mechanism: Mechanism, name: str = "O") -> list[tuple[float, float]]:
+def points(mechanism, name="O"):
     """The points of a driver in SI."""
     values = mechanism.parameters()
     rows = range(len(mechanism.drivers[name].points or ()))
     return [(values[f"drivers.{name}.points.{k}.time"], values[f"drivers.{name}.points.{k}.coordinate"]) for k in rows]
 
 
-def refused(read: Callable[[], object], folder: Path) -> list[str]:
+def refused(read, folder):
     """The findings without the folder."""
     with pytest.raises(MechanismError) as caught:
         read()
@@ -57,19 +54,19 @@ DEGREE = np.pi / 180
         f"t, q [rad]\n0,0\n0.05,{12.5 * DEGREE!r}\n0.1,{90 * DEGREE!r}",
     ],
 )
-def test_separators_headers_units_and_decimal_commas(text: str, tmp_path: Path) -> None:
+def test_separators_headers_units_and_decimal_commas(text, tmp_path):
     found = points(MODEL.with_table("O", csv(tmp_path, text)))
     np.testing.assert_allclose(found, [(0, 0), (0.05, 12.5 * DEGREE), (0.1, 90 * DEGREE)], rtol=1e-15)
 
 
-def test_units_are_converted_exactly_and_kept(tmp_path: Path) -> None:
+def test_units_are_converted_exactly_and_kept(tmp_path):
     mechanism = MODEL.with_table("O", csv(tmp_path, "t [ms];q [deg]\n0;0\n93,782;-5\n"))
     assert points(mechanism)[1][0] == 0.093782
     assert mechanism.data()["drivers"]["O"] == {"law": "table", "points": [["0 ms", "0 deg"], ["93.782 ms", "-5 deg"]]}
     assert Mechanism(**mechanism.data()) == mechanism
 
 
-def test_a_model_may_leave_the_points_to_the_file(tmp_path: Path) -> None:
+def test_a_model_may_leave_the_points_to_the_file(tmp_path):
     """And a file given beside a model goes before the one that it names."""
     text = SLIDER_CRANK.read_text("utf-8")
     path = tmp_path / "model.yaml"
@@ -110,21 +107,21 @@ BAD = [
 
 
 @pytest.mark.parametrize(("text", "expected"), BAD)
-def test_one_finding_for_each_problem(text: str, expected: list[str], tmp_path: Path) -> None:
+def test_one_finding_for_each_problem(text, expected, tmp_path):
     found = refused(lambda: MODEL.with_table("O", csv(tmp_path, text)), tmp_path)
     assert len(found) == len(expected), found
     for line, start in zip(found, expected, strict=True):
         assert line.startswith(start), line
 
 
-def test_what_is_no_text_or_not_there(tmp_path: Path) -> None:
+def test_what_is_no_text_or_not_there(tmp_path):
     (tmp_path / "latin.csv").write_bytes(b"t,\xb0\n0,1\n")
     for name, file, what in (
         ("O", "absent.csv", "cannot be read: No such file"), ("O", ".", "it is not a file"),
         ("O", "latin.csv", "latin.csv:1: error: is not UTF-8 text (byte 2)"),
         ("presure", "latin.csv", "there is no driver or table 'presure' — did you mean 'pressure'"),
     ):  # fmt: skip
-        assert what in refused(lambda name=name, file=file: MODEL.with_table(name, tmp_path / file), tmp_path)[0]  # type: ignore[misc]
+        assert what in refused(lambda name=name, file=file: MODEL.with_table(name, tmp_path / file), tmp_path)[0]
 
 
 SOURCE = SLIDER_CRANK.read_text("utf-8")
@@ -135,7 +132,7 @@ CSV = "angle [deg];pressure [bar]\n" + "".join(
 )
 
 
-def written(folder: Path, stated: str = "file: gas.csv", points: str | None = CSV, name: str = "model.yaml") -> Path:
+def written(folder, stated="file: gas.csv", points=CSV, name="model.yaml"):
     """The example with its table in a file, or stated otherwise."""
     path = folder / name
     path.write_text(SOURCE.replace(INLINE, f"             {stated}}}\n"), encoding="utf-8")
@@ -144,12 +141,12 @@ def written(folder: Path, stated: str = "file: gas.csv", points: str | None = CS
     return path
 
 
-def refused_model(path: Path) -> list[str]:
+def refused_model(path):
     return refused(lambda: read_mechanism(path), path.parent)
 
 
 # what is read
-def test_the_model_is_the_one_with_the_points_in_it(tmp_path: Path) -> None:
+def test_the_model_is_the_one_with_the_points_in_it(tmp_path):
     """Equal, with the same hash and the same results; another content is another model."""
     found, meant = read_mechanism(written(tmp_path)), read_mechanism(SLIDER_CRANK)
     assert found == meant
@@ -161,7 +158,7 @@ def test_the_model_is_the_one_with_the_points_in_it(tmp_path: Path) -> None:
     assert read_mechanism(tmp_path / "model.yaml").digest != meant.digest
 
 
-def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path, monkeypatch):
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     written(tmp_path / "a")
@@ -175,7 +172,7 @@ def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path: Path, mon
         assert read_mechanism(path).tables["pressure"].points == POINTS
 
 
-def test_a_rewritten_model_goes_on_to_name_its_file(tmp_path: Path) -> None:
+def test_a_rewritten_model_goes_on_to_name_its_file(tmp_path):
     """Beside it as it was; elsewhere, or with other points, with these in it. Comments stay."""
     path = written(tmp_path)
     mechanism = read_mechanism(path).with_values({"r": "36 mm"})
@@ -213,7 +210,7 @@ OUTSIDE = ["../gas.csv", "a/../../gas.csv", "/etc/gas.csv", "C:/gas.csv", "c:gas
         ("", "is no name of a CSV file"), ("x" * 300 + ".csv", "is no name of a CSV file"),
     ],
 )  # fmt: skip
-def test_what_is_no_plain_file_in_the_folder(name: str, said: str, tmp_path: Path) -> None:
+def test_what_is_no_plain_file_in_the_folder(name, said, tmp_path):
     """Whether there is such a file outside is not told."""
     folder, other = tmp_path / "folder", tmp_path / "other"
     for place in (folder, other):
@@ -232,7 +229,7 @@ def test_what_is_no_plain_file_in_the_folder(name: str, said: str, tmp_path: Pat
     assert "root:" not in only
 
 
-def test_sizes_are_bounded(tmp_path: Path) -> None:
+def test_sizes_are_bounded(tmp_path):
     started = time.process_time()
     path = written(tmp_path, points="0;1\n" * (MAX_ROWS + 2))
     assert "to 10000" in refused_model(path)[0]
@@ -253,7 +250,7 @@ def test_sizes_are_bounded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("part", ["tables", "drivers"])
-def test_a_model_that_is_no_file_has_no_folder(part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_is_no_file_has_no_folder(part, tmp_path, monkeypatch):
     """Of a mapping in Python: a finding with what to do, and nothing is read from where one happens to stand."""
     (tmp_path / "gas.csv").write_text(CSV, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -273,7 +270,7 @@ MEASURED = "angle [deg];pressure [bar]\n" + "".join(f"{10 * k};{4 + np.cos(k * n
 CLOSED = MEASURED + "360;5.000000\n"
 
 
-def test_a_period_closes_a_table(tmp_path: Path) -> None:
+def test_a_period_closes_a_table(tmp_path):
     for interpolation in ("linear", "spline"):
         stated = f"file: gas.csv, interpolation: {interpolation}"
         whole = trunnion.analyse(read_mechanism(written(tmp_path, stated, CLOSED)), 72)
@@ -283,7 +280,7 @@ def test_a_period_closes_a_table(tmp_path: Path) -> None:
         assert found.with_values({"tables.pressure.period": "365 deg"}).digest != found.digest
 
 
-def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:
+def test_a_table_over_time_by_the_time_of_a_turn(tmp_path):
     """At 1450/min a turn takes 41.3793 ms; a table of 41 ms would not come again with it."""
     points = "t [ms];p [bar]\n0;1\n20;2\n{end};1\n"
     over = "over: time, periodic: true"
@@ -300,7 +297,7 @@ def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:
 
 # files with more columns
 @pytest.mark.parametrize("names", ["[pressure, turn]", "[turn, pressure]", "['turn [deg]', pressure]"])
-def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Path) -> None:
+def test_two_columns_of_more_are_named_by_their_headers(names, tmp_path):
     """In any order of the file, with and without the unit; a text in a third column does not matter."""
     rows = [line.split(";") for line in CSV.splitlines()[1:]]
     text = "note;pressure [bar];turn [deg]\n" + "".join(f"x;{value};{place}\n" for place, value in rows)
@@ -324,9 +321,7 @@ def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Pa
         (f"time,turn,p\n0,0,8\n1,3,5\n2,{2 * np.pi!r},8\n", [(0.0, 8.0), (3.0, 5.0), (2 * np.pi, 8.0)]),
     ],
 )
-def test_units_below_the_headers_and_numbers_of_si(
-    text: str, points: list[tuple[float, float]], tmp_path: Path
-) -> None:
+def test_units_below_the_headers_and_numbers_of_si(text, points, tmp_path):
     found = read_mechanism(written(tmp_path, "file: gas.csv, columns: [turn, p]", text))
     stated = found.parameter_set.stated
     where = [f"tables.pressure.points.{i}" for i in range(len(points))]
@@ -358,5 +353,5 @@ def test_units_below_the_headers_and_numbers_of_si(
         ("file: gas.csv, points: [[0 deg, 1 bar], [360 deg, 1 bar]]", CSV, "states both points and a file"),
     ],
 )
-def test_a_table_of_a_file_stated_wrongly(stated: str, text: str | None, words: str, tmp_path: Path) -> None:
+def test_a_table_of_a_file_stated_wrongly(stated, text, words, tmp_path):
     assert words in "\n".join(refused_model(written(tmp_path, stated, text)))

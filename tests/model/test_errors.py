@@ -1,11 +1,7 @@
 """What is off nominal in a model: named errors, misaligned axes, plays and seats; every way to state one wrongly."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,20 +19,20 @@ FOURBAR, RSSR, CARDAN, SLIDER, PLAYING = (
 )
 
 
-def refusal(mechanism: Mechanism, values: Mapping[str, Any]) -> str:
+def refusal(mechanism, values):
     """What is said of values that a mechanism cannot have."""
     with pytest.raises(MechanismError) as error:
         mechanism.with_values(values)
     return str(error.value)
 
 
-def doubts(mechanism: Mechanism) -> list[str]:
+def doubts(mechanism):
     """Its warnings."""
     return [str(one) for one in check_model(mechanism) if one.severity is Severity.WARNING]
 
 
 # errors of named numbers
-def test_an_error_shifts_its_number_and_what_depends_on_it() -> None:
+def test_an_error_shifts_its_number_and_what_depends_on_it():
     off = FOURBAR.with_values({"errors.BE": "0.5 mm", "errors.rocker.points.C.x": -2e-3, "errors.crank.mass": 0.1})
     built, ideal, nominal = off.parameters(), off.ideal_parameters(), FOURBAR.parameters()
     assert built["dimensions.BE"] == 2.5005
@@ -53,7 +49,7 @@ def test_an_error_shifts_its_number_and_what_depends_on_it() -> None:
     assert Mechanism(**off.data()) == off
 
 
-def test_overrides_beside_an_error() -> None:
+def test_overrides_beside_an_error():
     off = FOURBAR.with_values({"errors.AB": "1 mm", "errors.C.pin.radius": "10 um"})
     assert off.parameters({"AB": 2.0})["links.crank.points.B.x"] == 2.0  # the sum is replaced
     assert off.parameters({"errors.AB": 2e-3})["links.crank.points.B.x"] == 2.002
@@ -66,7 +62,7 @@ def test_overrides_beside_an_error() -> None:
     assert [defaults[f"joints.{name}.pin.radius"] for name in "BC"] == [0.02, pytest.approx(0.02001, rel=1e-15)]
 
 
-def test_errors_may_speak_of_dimensions() -> None:
+def test_errors_may_speak_of_dimensions():
     data = FOURBAR.data()
     data["dimensions"]["wear"] = "0.1 mm"
     off = Mechanism(**data, errors={"AB": "2 * wear", "C.pin.radius": "-wear"})
@@ -76,7 +72,7 @@ def test_errors_may_speak_of_dimensions() -> None:
     assert changed["joints.C.pin.radius"] == pytest.approx(off.ideal_parameters()["joints.C.pin.radius"] - 1e-3)
 
 
-def test_paths_of_what_is_not_stated_yet() -> None:
+def test_paths_of_what_is_not_stated_yet():
     paths = {
         "errors.AB": "errors.dimensions.AB", "AB": "dimensions.AB", "B.pin.clearance": "joints.B.pin.clearance",
         "joints.B.seat.xi": "joints.B.seat.xi", "joint_defaults.pin.clearance": "joint_defaults.pin.clearance",
@@ -91,7 +87,7 @@ def test_paths_of_what_is_not_stated_yet() -> None:
 
 
 # misalignment
-def test_every_turning_axis_can_be_misaligned() -> None:
+def test_every_turning_axis_can_be_misaligned():
     values = RSSR.parameters()
     assert {path for path in values if "misalignment" in path} == {
         f"joints.{name}.misalignment.{key}" for name in "AD" for key in ("tilt", "towards", "offset", "offset_towards")
@@ -105,7 +101,7 @@ def test_every_turning_axis_can_be_misaligned() -> None:
     assert off.with_values({"joint_defaults.seat": "free", "D.seat": "free"}).has_errors
 
 
-def test_the_offset_goes_towards_the_tilt_unless_stated() -> None:
+def test_the_offset_goes_towards_the_tilt_unless_stated():
     path = "joints.A.misalignment"
     off = RSSR.with_values({f"{path}.towards": 0.5})
     assert off.parameters()[f"{path}.offset_towards"] == 0.5
@@ -114,7 +110,7 @@ def test_the_offset_goes_towards_the_tilt_unless_stated() -> None:
     assert [own.parameters()[f"{path}.{key}"] for key in ("towards", "offset_towards")] == [0.5, 0.1]
 
 
-def test_a_row_of_a_loop_has_misalignment_and_seat() -> None:
+def test_a_row_of_a_loop_has_misalignment_and_seat():
     off = CARDAN.with_values({"joints.pin-1.misalignment.tilt": "0.1 deg", "joints.pin-1.seat": "loaded"})
     assert off.loop[1].seat == "loaded"
     assert off.stated_joints["pin-1"].seat == "loaded"
@@ -124,7 +120,7 @@ def test_a_row_of_a_loop_has_misalignment_and_seat() -> None:
 
 
 # plays and seats
-def test_play_by_clearance_radii_and_fit() -> None:
+def test_play_by_clearance_radii_and_fit():
     found = FOURBAR.with_values(
         {"A.pin.clearance": "20 um", "B.pin.hole_radius": "7.51 mm", "C.pin.cylindricity": 1e-6}
     )
@@ -145,7 +141,7 @@ def test_play_by_clearance_radii_and_fit() -> None:
     ("limits", "radius", "hole", "clearance"),
     [("minimum", -3.5, 0, 3.5), ("mean", -6.75, 5.25, 12), ("maximum", -10, 10.5, 20.5)],
 )
-def test_nominal_limits_of_a_fit(limits: str, radius: float, hole: float, clearance: float) -> None:
+def test_nominal_limits_of_a_fit(limits, radius, hole, clearance):
     """25 H7/g6: hole 0 … 21 µm, shaft −20 … −7 µm on the diameter."""
     found = FOURBAR.with_values({"fits": limits})
     data = found.data()
@@ -161,7 +157,7 @@ def test_nominal_limits_of_a_fit(limits: str, radius: float, hole: float, cleara
     assert tolerances["joints.B.pin.hole_radius"] == pytest.approx((-hole * 1e-6, (10.5 - hole) * 1e-6), abs=1e-15)
 
 
-def test_the_size_of_a_fit_may_be_an_expression() -> None:
+def test_the_size_of_a_fit_may_be_an_expression():
     data = FOURBAR.data()
     data["dimensions"]["bore"] = "24 mm"
     data["joint_defaults"]["pin"] = {"fit": "bore + 1 mm H7/g6"}
@@ -173,7 +169,7 @@ def test_the_size_of_a_fit_may_be_an_expression() -> None:
     assert larger.parameters()["joints.A.pin.radius"] == pytest.approx(30e-3 - 9.75e-6, abs=1e-15)
 
 
-def test_one_way_to_state_the_play_replaces_the_default_one() -> None:
+def test_one_way_to_state_the_play_replaces_the_default_one():
     data = FOURBAR.data()
     data["joint_defaults"]["pin"] = {"radius": "7.5 mm", "clearance": "20 um"}
     data["joints"]["A"]["pin"] = {"hole_radius": "7.6 mm"}
@@ -185,7 +181,7 @@ def test_one_way_to_state_the_play_replaces_the_default_one() -> None:
     assert plays == pytest.approx([1e-4, 10.25e-6, 3e-5, 2e-5], abs=1e-12)  # 15 H7/g6: 6 to 35 µm, halved
 
 
-def test_seats_of_joints_and_defaults() -> None:
+def test_seats_of_joints_and_defaults():
     assert PLAYING.seated == dict.fromkeys("ABCD", "loaded")
     assert PLAYING.has_errors
     some = PLAYING.with_values({"joints.A.seat": "free", "B.seat.xi": "30 deg", "C.pin.clearance": 0})
@@ -197,7 +193,7 @@ def test_seats_of_joints_and_defaults() -> None:
     assert SLIDER.seated == {}
 
 
-def test_a_default_seat_is_for_joints_with_play() -> None:
+def test_a_default_seat_is_for_joints_with_play():
     found = RSSR.with_values({"joint_defaults.seat": "loaded"})
     assert {name: joint.seat for name, joint in found.effective_joints.items()} == {
         **dict.fromkeys("ABC", "free"), "D": "loaded"
@@ -213,7 +209,7 @@ def test_a_default_seat_is_for_joints_with_play() -> None:
     assert turned.parameters()["joints.B.seat.direction.x"] == 1
 
 
-def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
+def test_the_end_float_of_the_defaults_is_for_revolute_joints():
     data = RSSR.data()
     data["joint_defaults"]["pin"] = {"end_float": "0.1 mm"}
     values = Mechanism(**data).parameters()
@@ -246,7 +242,7 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
         (RSSR, "", {"B.pin.clearance": "1 um", "B.seat.xi": 1}, "joint in space has its seat stated by a direction"),
     ],
 )
-def test_what_cannot_be_stated_is_refused(mechanism: Mechanism, name: str, value: Any, what: str) -> None:
+def test_what_cannot_be_stated_is_refused(mechanism, name, value, what):
     assert what in refusal(mechanism, value if isinstance(value, dict) else {name: value})
 
 
@@ -267,7 +263,7 @@ RSSR_PIN = {key: value for key, value in RSSR.data()["joints"]["D"]["pin"].items
         (RSSR, "A", {"type": "helical", "pitch": 1e-3, "seat": "loaded", "pin": {}}, "in space has no play that"),
     ],
 )  # fmt: skip
-def test_joints_with_seats_stated_wrongly(mechanism: Mechanism, joint: str, keys: dict[str, Any], what: str) -> None:
+def test_joints_with_seats_stated_wrongly(mechanism, joint, keys, what):
     data = mechanism.data()
     data["joints"][joint] |= keys
     with pytest.raises(MechanismError) as error:
@@ -276,13 +272,13 @@ def test_joints_with_seats_stated_wrongly(mechanism: Mechanism, joint: str, keys
 
 
 # what is doubtful
-def with_fit(text: str, **joint: Any) -> Mechanism:
+def with_fit(text, **joint):
     data = FOURBAR.data()
     data["joints"]["B"] |= {"pin": {"fit": text}, **joint}
     return Mechanism(**data)
 
 
-def test_press_fits() -> None:
+def test_press_fits():
     (doubt,) = doubts(with_fit("40 mm H7/p6"))
     assert "40 mm H7/p6 is a press fit, no play: it cannot turn as a bearing" in doubt
     assert "-42 um to -1 um" in doubt
@@ -295,7 +291,7 @@ def test_press_fits() -> None:
     with_fit("40 mm H7/p6", seat="free")
 
 
-def test_large_plays_and_short_pins() -> None:
+def test_large_plays_and_short_pins():
     assert not doubts(PLAYING)
     (doubt,) = doubts(PLAYING.with_values({"A.pin.clearance": "0.31 mm"}))
     assert "a play of 0.31 mm is 1.03 % of the 30 mm from 'A' to 'B'" in doubt

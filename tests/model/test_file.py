@@ -1,7 +1,5 @@
 """Model files: what is read is what is written and what the schema has; a file that is none does no harm."""
 
-from __future__ import annotations
-
 import copy
 import json
 import os
@@ -9,8 +7,6 @@ import random
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -35,7 +31,7 @@ FindingsOf = Callable[..., tuple[Finding, ...]]
 @pytest.mark.spread(32)
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("extension", ["yaml", "json"])
-def test_examples_are_read_and_written_without_loss(example: Path, extension: str, tmp_path: Path) -> None:
+def test_examples_are_read_and_written_without_loss(example, extension, tmp_path):
     """As a model with every section is, below: what is written is what was read."""
     mechanism = read_mechanism(example)
     # the pins of Pezzuti et al. are shorter than their diameter, which counts where they lean in their holes
@@ -46,7 +42,7 @@ def test_examples_are_read_and_written_without_loss(example: Path, extension: st
     assert os.listdir(tmp_path / "copies") == [f"copy.{extension}"]  # no temporary file stays behind
 
 
-def written_and_read(mechanism: Mechanism, path: Path) -> None:
+def written_and_read(mechanism, path):
     """What is written is what was read."""
     mechanism.write(path)
     again = Mechanism.read(path)
@@ -57,7 +53,7 @@ def written_and_read(mechanism: Mechanism, path: Path) -> None:
 
 @pytest.mark.parametrize("text", [VARIED, RSSP])
 @pytest.mark.parametrize("extension", ["yaml", "json"])
-def test_a_model_with_every_section_is_read_and_written_without_loss(text: str, extension: str, tmp_path: Path) -> None:
+def test_a_model_with_every_section_is_read_and_written_without_loss(text, extension, tmp_path):
     (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
     written_and_read(read_mechanism(tmp_path / "model.yaml"), tmp_path / f"copy.{extension}")
 
@@ -74,7 +70,7 @@ speed = "10 rad/s"
 """
 
 
-def test_toml_and_json_with_tabs_and_their_lines(tmp_path: Path, findings_of: FindingsOf) -> None:
+def test_toml_and_json_with_tabs_and_their_lines(tmp_path, findings_of):
     path, data = tmp_path / "good.toml", read_mechanism(DURANGO).data()
     path.write_text(TOML)
     assert read_mechanism(path).parameters()["links.crank.points.B.x"] == 2.0
@@ -123,7 +119,7 @@ BAD_FILES = [
 
 
 @pytest.mark.parametrize("row", BAD_FILES)
-def test_files_that_are_no_model(findings_of: FindingsOf, row: tuple[Any, ...]) -> None:
+def test_files_that_are_no_model(findings_of, row):
     *name, content, line, what, remedy = row
     started = time.process_time()
     found = findings_of(content, *name)
@@ -135,7 +131,7 @@ def test_files_that_are_no_model(findings_of: FindingsOf, row: tuple[Any, ...]) 
 
 @pytest.mark.parametrize("name", ["model.yaml", "model.json", "model.toml"])
 @pytest.mark.parametrize("depth", [MAX_DEPTH - 1, MAX_DEPTH, MAX_DEPTH + 1, MAX_DEPTH + 2])
-def test_nesting_up_to_the_limit(findings_of: FindingsOf, name: str, depth: int) -> None:
+def test_nesting_up_to_the_limit(findings_of, name, depth):
     """The file itself is the first group; at the limit it is read, and what it says is refused for what it is."""
     value = "[" * (depth - 1) + "]" * (depth - 1)
     texts = {"yaml": f"trunnion: 1\nx: {value}\n", "json": f'{{"trunnion": 1, "x": {value}}}',
@@ -150,7 +146,7 @@ def test_nesting_up_to_the_limit(findings_of: FindingsOf, name: str, depth: int)
     [("missing.yaml", "cannot be read: No such file or directory"), ("folder.yaml", "is not a file"),
      ("model.txt", "the extension '.txt' is not one of YAML, JSON or TOML"), ("model", "the extension '' is not one")],
 )  # fmt: skip
-def test_paths_that_are_no_file(tmp_path: Path, name: str, what: str) -> None:
+def test_paths_that_are_no_file(tmp_path, name, what):
     (tmp_path / "folder.yaml").mkdir()
     with pytest.raises(MechanismError) as error:
         read_mechanism(tmp_path / name)
@@ -160,7 +156,7 @@ def test_paths_that_are_no_file(tmp_path: Path, name: str, what: str) -> None:
     assert finding.file == str(tmp_path / name)
 
 
-def test_a_huge_file_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_huge_file_is_refused_at_once(tmp_path):
     path = tmp_path / "huge.yaml"
     with path.open("wb") as stream:
         stream.truncate(50_000_000)
@@ -170,7 +166,7 @@ def test_a_huge_file_is_refused_at_once(tmp_path: Path) -> None:
     assert time.process_time() - started < 0.5
 
 
-def test_writing_fails_whole(tmp_path: Path) -> None:
+def test_writing_fails_whole(tmp_path):
     mechanism = read_mechanism(DURANGO)
     with pytest.raises(MechanismError, match="cannot be written: No such file or directory"):
         mechanism.write(tmp_path / "none" / "model.yaml")
@@ -192,7 +188,7 @@ VALUES = st.one_of(
 @pytest.mark.slow
 @settings(deadline=None, max_examples=50)
 @given(VALUES, st.sampled_from(["yaml", "json"]))
-def test_any_value_is_read_back_as_written(tmp_path_factory: pytest.TempPathFactory, value: object, kind: str) -> None:
+def test_any_value_is_read_back_as_written(tmp_path_factory, value, kind):
     base = read_mechanism(DURANGO).data()
     base["dimensions"] = {**base["dimensions"], "yes": 2, "extra": value}
     mechanism = Mechanism(**base)
@@ -207,22 +203,22 @@ def test_any_value_is_read_back_as_written(tmp_path_factory: pytest.TempPathFact
 MUTANTS = int(os.environ.get("TRUNNION_MUTANTS", "12"))
 
 
-ODD: list[object] = [
+ODD = [
     None, True, 0, -1, 1e308, 10**400, float("nan"), "", "A", "AB", "-5 mm", "1/0", [], {}, [1], [[1]], {"a": 1},
     "x" * 600, {"at": 3}, [0, 0, 0], {"law": "x"}, {1: 2}, ("a", "b"), b"x", object(),
 ]  # fmt: skip
 
 
-def _holders(data: object) -> list[tuple[dict[object, object] | list[object], object]]:
+def _holders(data):
     """Every place in plain data that a value can be put at."""
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    return [place for key, value in items for place in [(data, key), *_holders(value)]]  # type: ignore[list-item]
+    return [place for key, value in items for place in [(data, key), *_holders(value)]]
 
 
 @pytest.mark.sample(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> None:
+def test_no_odd_value_anywhere_gives_anything_but_findings(example):
     draw = random.Random(f"odd value in {example.stem}")
     whole = read_mechanism(example).data()
     for _ in range(MUTANTS * 5):
@@ -230,14 +226,14 @@ def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> Non
         for _ in range(draw.randint(1, 3)):
             holder, key = draw.choice(_holders(data))
             if draw.random() < 0.2:
-                del holder[key]  # type: ignore[arg-type]
+                del holder[key]
             else:
-                holder[key] = copy.deepcopy(draw.choice(ODD))  # type: ignore[index, call-overload]  # the next may go into it
+                holder[key] = copy.deepcopy(draw.choice(ODD))  # the next may go into it
         with suppress(MechanismError):
             Mechanism(**data).parameters()
 
 
-def test_anchors_mean_nothing(tmp_path: Path) -> None:
+def test_anchors_mean_nothing(tmp_path):
     """Nothing may refer to them, so two of one name are no matter; and the text stays as it is written."""
     source = next(path for path in EXAMPLES if path.stem == "slider-crank")
     text = source.read_text(encoding="utf-8")
@@ -270,23 +266,23 @@ BOMBS = {
 @pytest.mark.spread(29)
 @pytest.mark.parametrize("bomb", BOMBS)
 @pytest.mark.parametrize("reader", [read, Rig.read, read_mapping])
-def test_what_never_ends_is_a_finding(bomb: str, reader: object, tmp_path: Path) -> None:
+def test_what_never_ends_is_a_finding(bomb, reader, tmp_path):
     suffix, text = BOMBS[bomb]
     path = tmp_path / f"bomb{suffix}"
     path.write_text(text)
     begin = time.process_time()
     with pytest.raises(MechanismError):
-        reader(path)  # type: ignore[operator]
+        reader(path)
     assert time.process_time() - begin < 10
 
 
-def test_the_shipped_schema_is_up_to_date() -> None:
+def test_the_shipped_schema_is_up_to_date():
     assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text(), "run python -m trunnion.model.schema"
 
 
 @pytest.mark.spread(15)
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_the_examples_satisfy_the_schema(example) -> None:  # type: ignore[no-untyped-def]
+def test_the_examples_satisfy_the_schema(example):
     jsonschema = pytest.importorskip("jsonschema")
     validator = jsonschema.Draft202012Validator(json_schema())
     data = read_mechanism(example).data()
@@ -295,7 +291,7 @@ def test_the_examples_satisfy_the_schema(example) -> None:  # type: ignore[no-un
     assert not validator.is_valid({**data, "links": {"a": {"points": {"A": {"axis": [1, 0]}}}}})
 
 
-def test_the_schema_has_the_tables_their_limits_and_their_files() -> None:
+def test_the_schema_has_the_tables_their_limits_and_their_files():
     parts, text = json_schema()["$defs"], json.dumps(json_schema())
     names = {*PAIRS, *FRICTION_LAWS, *(key for law in FRICTION_LAWS.values() for key in law.parameters)}
     assert not [name for name in names if f'"{name}"' not in text]

@@ -1,12 +1,8 @@
 """Every way to state a model wrongly is a finding that says what, where and in which line, with a remedy."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 from model_samples import EXAMPLES, FOURBAR, RSSP, VARIED
@@ -249,7 +245,7 @@ CASES = [(text, old, *case) for text, group in MISTAKES.items() for old, cases i
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_one_mistake_is_found_where_it_is(findings_of: FindingsOf, case: tuple[Any, ...]) -> None:
+def test_one_mistake_is_found_where_it_is(findings_of, case):
     text, old, new, where, what, *below = case
     found = findings_of(text.replace(old, new))
     fitting = [finding for finding in found if where in finding.where and what in finding.what]
@@ -258,11 +254,11 @@ def test_one_mistake_is_found_where_it_is(findings_of: FindingsOf, case: tuple[A
     assert all(finding.where and finding.line for finding in found)
 
 
-def test_a_number_outside_its_limits_is_found_where_it_stands(tmp_path: Path) -> None:
+def test_a_number_outside_its_limits_is_found_where_it_stands(tmp_path):
     """Every number whose field declares limits, of the samples and examples, just beyond each of them."""
     for name, text in (("four-bar", FOURBAR), ("varied", VARIED), ("rssp", RSSP)):
         (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
-    tried: set[tuple[str, str | int]] = set()
+    tried = set()
     for path in [*EXAMPLES, *sorted(tmp_path.glob("*.yaml"))]:
         mechanism = read_mechanism(path)
         for entry in [*mechanism.entries, *mechanism.further_entries]:
@@ -316,9 +312,7 @@ EXACTLY = [
 
 
 @pytest.mark.parametrize(("text", "changes", "places"), EXACTLY)
-def test_exactly_these_findings(
-    findings_of: FindingsOf, text: str, changes: list[tuple[str, str]], places: list[str]
-) -> None:
+def test_exactly_these_findings(findings_of, text, changes, places):
     for old, new in changes:
         assert text.count(old) == 1
         text = text.replace(old, new)
@@ -328,7 +322,7 @@ def test_exactly_these_findings(
     assert sorted(finding.where for finding in found) == sorted(places), "\n".join(map(str, found))
 
 
-def test_python_raises_the_same_findings_without_lines() -> None:
+def test_python_raises_the_same_findings_without_lines():
     data = {"links": {"ground": {"points": {"A": [0, 0]}, "mas": 1}},
             "joints": {"A": Joint(type="revolute", links=("ground", "crank"))}}  # fmt: skip
     with pytest.raises(MechanismError) as error:
@@ -338,13 +332,13 @@ def test_python_raises_the_same_findings_without_lines() -> None:
     assert all(finding.line is None and not finding.file for finding in found)
 
 
-def warned(text: str, tmp_path: Path) -> dict[str, Severity]:
+def warned(text, tmp_path):
     """Where the doubts about a text stand, and their severity."""
     (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
     return {finding.where: finding.severity for finding in check_model(read_mechanism(tmp_path / "model.yaml"))}
 
 
-def test_doubts_are_kept_apart_from_errors(tmp_path: Path) -> None:
+def test_doubts_are_kept_apart_from_errors(tmp_path):
     text = FOURBAR.replace("AB: 2 m", "AB: 2 m\n  unused: 3")
     found = warned(text, tmp_path)
     assert found["dimensions.unused"] is Severity.NOTE
@@ -367,7 +361,7 @@ def test_doubts_are_kept_apart_from_errors(tmp_path: Path) -> None:
         ("xx: 1e-6, yy: 1e-6, zz: -1e-8", Severity.ERROR),
     ],
 )
-def test_moments_of_inertia_that_were_rounded(tmp_path: Path, moments: str, severity: Severity | None) -> None:
+def test_moments_of_inertia_that_were_rounded(tmp_path, moments, severity):
     text = RSSP.replace("xx: 1.0e-6, yy: 9.6e-4, zz: 9.6e-4", moments)
     try:
         found = warned(text, tmp_path)
@@ -377,13 +371,13 @@ def test_moments_of_inertia_that_were_rounded(tmp_path: Path, moments: str, seve
 
 
 @pytest.mark.parametrize("name", ["pin 1", "left: pin", "a, b", "#1", "[x]", "{x}", "no", "12", "it's", '"big"', "& γ"])
-def test_a_name_that_advice_puts_into_a_file_is_a_key_of_it(name: str) -> None:
+def test_a_name_that_advice_puts_into_a_file_is_a_key_of_it(name):
     load = YAML(typ="safe", pure=True).load
     assert list(load(f"{{{as_key(name)}: 1}}")) == list(load(f"{as_key(name)}: 1")) == [name]
 
 
 # loops
-LOOP: dict[str, Any] = {
+LOOP = {
     "space": "spatial",
     "loop": [
         {"joint": "a", "type": "revolute", "link": "shaft", "twist": "90 deg", "slide": "3 mm"},
@@ -404,7 +398,7 @@ LOOP: dict[str, Any] = {
 }  # fmt: skip
 
 
-def changed(*path: Any, to: Any) -> dict[str, Any]:
+def changed(*path, to):
     """The loop with one entry changed, or taken out (None)."""
     data = copy.deepcopy(LOOP)
     holder = data
@@ -445,14 +439,14 @@ INERTIA = ("links", "cross", "inertia")
         (changed("joint_defaults", "pin", "bearing", to=None), "joints.a", "without the length of the bearing"),
     ],
 )
-def test_mistakes_in_a_loop(data: dict[str, Any], where: str, what: str) -> None:
+def test_mistakes_in_a_loop(data, where, what):
     with pytest.raises(MechanismError) as error:
         Mechanism(**data)
     found = [finding for finding in error.value.findings if finding.where == where and what in finding.what]
     assert found, error.value
 
 
-def test_names_of_a_loop() -> None:
+def test_names_of_a_loop():
     mechanism = Mechanism(**LOOP)
     assert not [finding for finding in check_model(mechanism) if finding.severity is Severity.ERROR]
     assert mechanism.points == {"cross": ("tip", "b", "c"), "shaft": ("a", "b"), "fork": ("c", "d"),
@@ -461,7 +455,7 @@ def test_names_of_a_loop() -> None:
     assert mechanism.effective_joints["d"].links == ("fork", "ground")
 
 
-def test_later_findings_about_a_row_have_its_line(tmp_path: Path) -> None:
+def test_later_findings_about_a_row_have_its_line(tmp_path):
     path = tmp_path / "loop.yaml"
     Mechanism(**LOOP).write(path)
     line = 1 + next(k for k, text in enumerate(path.read_text("utf-8").splitlines()) if "joint: b" in text)
@@ -469,7 +463,7 @@ def test_later_findings_about_a_row_have_its_line(tmp_path: Path) -> None:
         assert placed([Finding("locks", where)], path) == [Finding("locks", where, line=line, file=str(path))]
 
 
-def test_rows_of_a_loop_are_set_by_name() -> None:
+def test_rows_of_a_loop_are_set_by_name():
     mechanism = Mechanism(**LOOP)
     other = mechanism.with_values({"loop.b.twist": "81 deg", "loop.a.slide": "4 mm", "d.pitch": "-5 mm",
                                    "b.pin.bearing": "40 mm", "c.friction.coefficient": 0.2})  # fmt: skip
@@ -483,9 +477,9 @@ def test_rows_of_a_loop_are_set_by_name() -> None:
         assert mechanism.with_values({path: new}).parameters()[path] == new, path
 
 
-def test_friction_of_a_loop_is_put_off_and_changed() -> None:
+def test_friction_of_a_loop_is_put_off_and_changed():
     mechanism = Mechanism(**changed("loop", 1, "friction", to=0.3))
-    assert mechanism.effective_joints["b"].friction.model == "pezzuti"  # type: ignore[union-attr]
+    assert mechanism.effective_joints["b"].friction.model == "pezzuti"
     assert all(joint.friction is None for joint in mechanism.with_friction("off").effective_joints.values())
     values = mechanism.with_friction("coulomb").parameters()
     assert [values[f"joints.{name}.friction.coefficient"] for name in "abcd"] == [0.1, 0.3, 0.1, 0.1]
@@ -495,7 +489,7 @@ def test_friction_of_a_loop_is_put_off_and_changed() -> None:
 
 
 @pytest.mark.parametrize("friction", [0, {"coefficient": 0}])
-def test_no_friction_needs_no_size_of_a_bearing(friction: object) -> None:
+def test_no_friction_needs_no_size_of_a_bearing(friction):
     loop = changed("joint_defaults", to={"pin": {"radius": 1}, "friction": friction})
     plane = YAML(typ="safe", pure=True).load(FOURBAR.replace("{radius: 7.5 mm}", "{}")) | {}
     plane["joint_defaults"]["friction"] = friction
@@ -503,14 +497,14 @@ def test_no_friction_needs_no_size_of_a_bearing(friction: object) -> None:
         assert all(joint.friction is None for joint in Mechanism(**data).effective_joints.values())
 
 
-def test_a_fixed_joint_is_not_asked_for_friction_by_the_defaults() -> None:
+def test_a_fixed_joint_is_not_asked_for_friction_by_the_defaults():
     text = RSSP.replace("C: {type: spherical, links: [rod, slider]}", "C: {type: fixed, links: [rod, slider]}")
     joints = Mechanism(**YAML(typ="safe", pure=True).load(text)).effective_joints
     assert joints["A"].friction is not None
     assert (joints["C"].friction, joints["C"].pin) == (None, None)
 
 
-def test_choices_among_words_are_set_like_numbers() -> None:
+def test_choices_among_words_are_set_like_numbers():
     four_bar, cardan = (
         Mechanism.read(next(path for path in EXAMPLES if path.stem == name))
         for name in ("fourbar-in-space", "pezzuti-cardan")
@@ -520,7 +514,7 @@ def test_choices_among_words_are_set_like_numbers() -> None:
     with pytest.raises(MechanismError, match="'refuse' or 'minimum-norm'"):
         four_bar.with_values({"over_constraint": "some"})
 
-    def models(**values: str) -> list[str | None]:
+    def models(**values):
         changed = cardan.with_values({key.replace("__", "."): value for key, value in values.items()})
         return [joint.friction.model for joint in changed.effective_joints.values() if joint.friction]
 

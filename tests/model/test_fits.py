@@ -7,8 +7,6 @@ Published limits, µm, as reprinted in:
 [R] the tables of shaft and housing limits in catalogues of rolling bearings (ISO 286-2).
 """
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -61,7 +59,7 @@ BEARINGS = [  # [R]
 
 
 @pytest.mark.parametrize(("size", "one", "lower", "upper"), PREFERRED + KEYS + BEARINGS)
-def test_published_limits(size: float, one: str, lower: float, upper: float) -> None:
+def test_published_limits(size, one, lower, upper):
     assert limits(size * 1e-3, one) == (lower / 1e6, upper / 1e6)
 
 
@@ -69,7 +67,7 @@ def test_published_limits(size: float, one: str, lower: float, upper: float) -> 
     ("size", "hole", "shaft", "least", "most"),
     [(25, "H7", "g6", 7, 41), (40, "H7", "p6", -42, -1), (25, "K7", "h6", -15, 19), (500, "H7", "u6", -580, -477)],
 )
-def test_published_fits(size: float, hole: str, shaft: str, least: float, most: float) -> None:
+def test_published_fits(size, hole, shaft, least, most):
     """Play on the diameter, µm [B]."""
     found = fit(size * 1e-3, hole, shaft)
     assert (found.minimum, found.maximum) == (least / 1e6, most / 1e6)
@@ -80,7 +78,7 @@ def test_published_fits(size: float, hole: str, shaft: str, least: float, most: 
 sizes = st.floats(0.0011, 0.5)
 
 
-def test_grades_follow_their_formula() -> None:
+def test_grades_follow_their_formula():
     """IT5 to IT16 are 7 i to 1000 i, i = 0.45 ∛D + 0.001 D µm (ISO 286-1, D the geometric mean of a range, mm).
 
     The smallest range is rounded up more, so it is left to the published limits.
@@ -93,7 +91,7 @@ def test_grades_follow_their_formula() -> None:
             assert GRADES[grade][column] == pytest.approx(factor * unit, rel=0.08, abs=0.7), (grade, high)
 
 
-def test_deviations_follow_their_formulas() -> None:
+def test_deviations_follow_their_formulas():
     """d, e, f, g, n and above 50 mm s, t, u by the formulas that the tables were rounded from (ISO 286-1 annex), µm."""
     for row, factor, power in (("d", 16, 0.44), ("e", 11, 0.41), ("f", 5.5, 0.41), ("g", 2.5, 0.34), ("n", 5, 0.34)):
         table = {**UPPER, **LOWER}[row]
@@ -106,13 +104,13 @@ def test_deviations_follow_their_formulas() -> None:
                 tolerance = limits(high * 1e-3, "H7")[1] * 1e6
                 assert value == pytest.approx(tolerance + factor * mean, rel=0.025), (row, high)
     for low, high, value, tolerance in zip((1, *SIZES), SIZES, LOWER["p"], GRADES[7], strict=False):
-        assert -5 <= value - tolerance <= 5, (low, high)  # type: ignore[operator]
+        assert -5 <= value - tolerance <= 5, (low, high)
     for place, (p, s) in enumerate(zip([limits(one * 1e-3, "p6")[0] for one in STEPS], LOWER["s"], strict=True)):
-        assert LOWER["r"][place] == pytest.approx((p * 1e6 * s) ** 0.5, abs=1.5)  # type: ignore[operator]
+        assert LOWER["r"][place] == pytest.approx((p * 1e6 * s) ** 0.5, abs=1.5)
 
 
 @given(sizes, st.integers(1, 16))
-def test_what_the_letters_mean(size: float, grade: int) -> None:
+def test_what_the_letters_mean(size, grade):
     width = limits(size, f"H{grade}")[1]
     assert limits(size, f"H{grade}") == (0, width)
     assert limits(size, f"h{grade}") == (-width, 0)
@@ -126,7 +124,7 @@ def test_what_the_letters_mean(size: float, grade: int) -> None:
 
 
 @given(sizes, st.sampled_from([*"kmnprsu"]), st.integers(4, 8))
-def test_a_hole_fits_a_shaft_one_grade_finer_as_the_letters_change_over(size: float, letter: str, grade: int) -> None:
+def test_a_hole_fits_a_shaft_one_grade_finer_as_the_letters_change_over(size, letter, grade):
     """H7/p6 and P7/h6 have the same limits of play, and so have all such pairs that Δ is there for."""
     if size <= 0.003 or grade > (8 if letter in "kmn" else 7):
         return
@@ -143,7 +141,7 @@ def test_a_hole_fits_a_shaft_one_grade_finer_as_the_letters_change_over(size: fl
 
 
 @given(sizes, st.sampled_from([*SHAFTS, *HOLES]), st.integers(1, 16))
-def test_every_class_has_its_width_or_a_finding(size: float, letter: str, grade: int) -> None:
+def test_every_class_has_its_width_or_a_finding(size, letter, grade):
     try:
         lower, upper = limits(size, f"{letter}{grade}")
     except MechanismError as error:
@@ -163,16 +161,16 @@ def test_every_class_has_its_width_or_a_finding(size: float, letter: str, grade:
         (25, "P2", "no 'P2'"),
     ],
 )  # fmt: skip
-def test_what_is_not_in_the_tables(size: float, symbol: str, what: str) -> None:
+def test_what_is_not_in_the_tables(size, symbol, what):
     with pytest.raises(MechanismError, match=what):
         limits(size * 1e-3, symbol)
 
 
-def test_a_fit_is_a_hole_and_a_shaft() -> None:
+def test_a_fit_is_a_hole_and_a_shaft():
     with pytest.raises(MechanismError, match="write H7/g6"):
         fit(0.025, "g6", "H7")
 
 
 @pytest.mark.parametrize("grade", GRADES)
-def test_the_width_of_a_grade(grade: int) -> None:
+def test_the_width_of_a_grade(grade):
     assert standard_tolerance(0.1, grade) == pytest.approx(GRADES[grade][7] * 1e-6, abs=1e-15)

@@ -1,7 +1,5 @@
 """A forgotten unit is told with its figure, and plain SI numbers are left alone."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -61,13 +59,13 @@ SHAFT = Path("examples/double-cardan.yaml").read_text(encoding="utf-8")
 SI = re.sub(r"(\d+) (mm|rpm)", r"\1", LINKAGE)
 
 
-def put(text: str, old: str, new: str) -> str:
+def put(text, old, new):
     """A text with something else in place of what it has once."""
     assert text.count(old) == 1
     return text.replace(old, new)
 
 
-def shaft(axis: str, dimensions: str = "", more: str = "") -> str:
+def shaft(axis, dimensions="", more=""):
     """The double Cardan shaft with the axis of the second fork of its middle shaft, and more dimensions."""
     turned = put(SHAFT, "C: {at: [0, 0, m], axis: [1, 0, 0]}", f"C: {{at: [0, 0, m], axis: {axis}}}")
     return turned.replace("dimensions:\n", f"dimensions:\n{dimensions}") + more
@@ -105,7 +103,7 @@ DOUBTS = [
 
 
 @pytest.mark.parametrize(("text", "places", "figure"), DOUBTS)
-def test_a_number_without_a_unit(tmp_path: Path, text: str, places: list[str], figure: str) -> None:
+def test_a_number_without_a_unit(tmp_path, text, places, figure):
     (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
     doubts = [one for one in read(tmp_path / "model.yaml").checked if "radians" in one.what or "forgotten" in one.what]
     assert [one.where for one in doubts] == places
@@ -113,7 +111,7 @@ def test_a_number_without_a_unit(tmp_path: Path, text: str, places: list[str], f
     assert {one.severity for one in doubts} <= {Severity.NOTE if "28.6" in figure else Severity.WARNING}
 
 
-def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) -> None:
+def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path):
     plain = CLAMP.replace("80 mm + pinch", "80 * pinch").replace("8 N/mm", "8000").replace("5 N", "5")
     plain = re.sub(r"(\d+) mm(/s)?", lambda found: str(int(found[1]) / 1000), plain)
     (tmp_path / "clamp.yaml").write_text(plain.replace("radius: 0.006", "radius: 6 mm"), encoding="utf-8")
@@ -125,16 +123,16 @@ def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) ->
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("stated", "values"), [("10 deg", (-10, 0, 3)), ("0 deg", [10, 3])])
-def test_plain_angles_of_a_sweep_are_told_once(tmp_path: Path, stated: str, values: object) -> None:
+def test_plain_angles_of_a_sweep_are_told_once(tmp_path, stated, values):
     (tmp_path / "shaft.yaml").write_text(shaft(TURNED, f"  phase: {stated}\n"), encoding="utf-8")
-    found = sweep(read(tmp_path / "shaft.yaml"), {"phase": values}, 4).trunnion.findings  # type: ignore[dict-item]
+    found = sweep(read(tmp_path / "shaft.yaml"), {"phase": values}, 4).trunnion.findings
     (told,) = (one for one in found if one.where == "dimensions.phase")
     assert told.severity is Severity.WARNING
     assert "10 " in told.what
     assert "the largest of" in told.what
 
 
-def test_a_default_that_no_joint_follows_is_told(tmp_path: Path) -> None:
+def test_a_default_that_no_joint_follows_is_told(tmp_path):
     """A fit is the pin's own clearance."""
     fitted = re.sub(r"(revolute, links: \[.*?\])", r"\1, pin: {fit: 12 mm H7/f7}", CLAMP)
     fitted = fitted.replace("pin: {radius: 6 mm}", "pin: {clearance: 0 mm}")

@@ -1,14 +1,11 @@
 """The mechanism: its numbers by name, joints with their defaults, measures, variants, identity."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math
 import operator
 import pickle
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
@@ -49,14 +46,14 @@ NUMBERS = [
 
 
 @pytest.mark.parametrize(("mechanism", "fixed", "expected"), NUMBERS)
-def test_numbers_of_examples(mechanism: Mechanism, fixed: str, expected: dict[str, float]) -> None:
+def test_numbers_of_examples(mechanism, fixed, expected):
     values = mechanism.parameters()
     assert {path: values[path] for path in expected} == pytest.approx(expected, rel=1e-15)
     assert mechanism.fixed_link == fixed
     assert all(isinstance(value, float) for value in values.values())
 
 
-def test_tolerances_and_joints_of_examples() -> None:
+def test_tolerances_and_joints_of_examples():
     halves = {
         "dimensions.crank": 2e-5, "dimensions.rod": 5e-5, "dimensions.offset": 1e-4, "joints.O.pin.radius": 3.25e-6,
         "joints.O.pin.hole_radius": 5.25e-6, "joints.P.pin.radius": 4.5e-6, "joints.P.pin.hole_radius": 4.5e-6,
@@ -67,7 +64,7 @@ def test_tolerances_and_joints_of_examples() -> None:
     assert CARDAN.effective_joints["input"].links == ("ground", "input-shaft")
 
 
-def test_a_dimension_carries_what_depends_on_it() -> None:
+def test_a_dimension_carries_what_depends_on_it():
     lengths = np.linspace(2.0, 3.0, 5)[:, None]
     values = DURANGO.parameters({"BE": lengths, "crank.mass": 5.0})
     assert values["links.coupler.points.E.y"] == pytest.approx(lengths / 2)
@@ -77,7 +74,7 @@ def test_a_dimension_carries_what_depends_on_it() -> None:
     assert DURANGO.parameters()["dimensions.BE"] == 2.5  # and the mechanism is as it was
 
 
-def test_defaults_are_followed_until_a_joint_has_its_own_value() -> None:
+def test_defaults_are_followed_until_a_joint_has_its_own_value():
     values = DURANGO.parameters({"joint_defaults.friction.coefficient": 0.2, "B.friction.coefficient": 0.3})
     found = [values[f"joints.{name}.friction.coefficient"] for name in "ABCD"]
     assert found == [0.2, 0.3, 0.2, 0.2]
@@ -100,7 +97,7 @@ def test_defaults_are_followed_until_a_joint_has_its_own_value() -> None:
         ("crank.mass.x", "there is no number named 'crank.mass.x'", "'crank.mass'"),
     ],
 )
-def test_unknown_names_and_numbers_that_are_not_stated(name: str, what: str, remedy: str) -> None:
+def test_unknown_names_and_numbers_that_are_not_stated(name, what, remedy):
     with pytest.raises(MechanismError):
         DURANGO.parameters({name: 1.0})
     with pytest.raises(MechanismError) as error:
@@ -109,7 +106,7 @@ def test_unknown_names_and_numbers_that_are_not_stated(name: str, what: str, rem
     assert remedy in error.value.findings[0].remedy
 
 
-def test_every_parameter_can_be_set_and_is_set() -> None:
+def test_every_parameter_can_be_set_and_is_set():
     for mechanism in (DURANGO, CARDAN, SLIDER):
         kinds = mechanism.parameter_kinds()
         for path, value in mechanism.parameters().items():
@@ -121,7 +118,7 @@ def test_every_parameter_can_be_set_and_is_set() -> None:
             assert kinds[path].unit
 
 
-def test_texts_are_set_with_the_kind_of_their_place() -> None:
+def test_texts_are_set_with_the_kind_of_their_place():
     changed = DURANGO.with_values({"AB": "2.1 m ± 1 mm", "joints.B.friction.coefficient": 0.3, "A.speed": "60 rpm"})
     values = changed.parameters()
     assert (values["links.crank.points.B.x"], values["drivers.A.speed"]) == (2.1, pytest.approx(2 * math.pi))
@@ -131,7 +128,7 @@ def test_texts_are_set_with_the_kind_of_their_place() -> None:
         DURANGO.with_values({"crank.mass": "AB"})
 
 
-def test_friction_merges_defaults_and_own_values() -> None:
+def test_friction_merges_defaults_and_own_values():
     data = DURANGO.data()
     data["joints"]["B"]["friction"] = {"pair_factor": "4/3"}
     data["joints"]["C"]["friction"] = 0.1
@@ -144,7 +141,7 @@ def test_friction_merges_defaults_and_own_values() -> None:
         assert numbers == {"pair_factor": factor, "coefficient": coefficient}
 
 
-def test_building_from_classes_is_building_from_data() -> None:
+def test_building_from_classes_is_building_from_data():
     data = DURANGO.data()
     classes = {
         "links": {name: Link(**link) for name, link in data["links"].items()},
@@ -163,7 +160,7 @@ def test_building_from_classes_is_building_from_data() -> None:
     assert Mechanism(**other.data()) == other
 
 
-def test_equal_mechanisms_have_equal_digests() -> None:
+def test_equal_mechanisms_have_equal_digests():
     data = DURANGO.data()
     same = Mechanism(**{**data, "links": dict(reversed(data["links"].items())), "gravity": [0.0, 0]})
     assert (same == DURANGO, same.digest == DURANGO.digest) == (True, True)
@@ -173,7 +170,7 @@ def test_equal_mechanisms_have_equal_digests() -> None:
 
 @pytest.mark.parametrize("name", ["durango-fourbar", "double-cardan", "piston-by-cost"])
 @pytest.mark.parametrize("analysed", [False, True])
-def test_a_mechanism_cannot_be_changed_in_place(name: str, analysed: bool) -> None:
+def test_a_mechanism_cannot_be_changed_in_place(name, analysed):
     mechanism = Mechanism.read(f"examples/{name}.yaml")
     if analysed:
         mechanism.parameters()
@@ -181,7 +178,7 @@ def test_a_mechanism_cannot_be_changed_in_place(name: str, analysed: bool) -> No
     groups = [mechanism.dimensions, mechanism.springs, mechanism.effective_joints, mechanism.processes, link.points]
     groups += mechanism.processes.values()
     groups += [mechanism.parameter_set.nominal, mechanism.parameter_set.entries]
-    calls: list[Any] = [partial(setattr, mechanism, "name", "other"), partial(delattr, link, "mass")]
+    calls = [partial(setattr, mechanism, "name", "other"), partial(delattr, link, "mass")]
     for friction in (joint.friction for joint in mechanism.effective_joints.values() if joint.friction):
         groups.append(friction.parameters)
         calls.append(partial(setattr, friction, "coefficient", 0.2))
@@ -197,7 +194,7 @@ def test_a_mechanism_cannot_be_changed_in_place(name: str, analysed: bool) -> No
             same.dimensions["L"] = 1.7
 
 
-def test_a_copy_with_an_update_is_checked_and_worked_out_anew() -> None:
+def test_a_copy_with_an_update_is_checked_and_worked_out_anew():
     mechanism = Mechanism.read("examples/durango-fourbar.yaml")
     before = mechanism.parameters()["dimensions.AB"]
     other = mechanism.model_copy(update={"dimensions": {**mechanism.dimensions, "AB": 2 * before}})
@@ -206,13 +203,13 @@ def test_a_copy_with_an_update_is_checked_and_worked_out_anew() -> None:
         mechanism.model_copy(update={"dimensions": {**mechanism.dimensions, "AB": "2 parsec per"}})
 
 
-def with_measure(mechanism: Mechanism, **keys: object) -> Mechanism:
+def with_measure(mechanism, **keys):
     return Mechanism(**{**mechanism.data(), "measures": {"one": keys}})
 
 
-def test_limits_are_two_numbers(varied: Mechanism) -> None:
+def test_limits_are_two_numbers(varied):
     values = varied.parameters()
-    found = {path: float(value) for path, value in values.items() if path.startswith("measures.")}  # type: ignore[arg-type]
+    found = {path: float(value) for path, value in values.items() if path.startswith("measures.")}
     limits = {
         "error.limit.lower": -0.1 * DEG, "error.limit.upper": 0.1 * DEG, "theta.at": 60 * DEG,
         "theta.limit.lower": -0.1 * DEG, "theta.limit.upper": 0.2 * DEG, "later.at": 0.1, "later.limit.lower": -2e-3,
@@ -222,7 +219,7 @@ def test_limits_are_two_numbers(varied: Mechanism) -> None:
     assert found == pytest.approx({f"measures.{name}": value for name, value in limits.items()}, rel=1e-14)
 
 
-def test_a_position_is_a_time_if_it_is_stated_as_one(varied: Mechanism) -> None:
+def test_a_position_is_a_time_if_it_is_stated_as_one(varied):
     kinds = varied.parameter_kinds()
     assert kinds["measures.theta.at"].name == "angle"
     assert kinds["measures.later.at"].name == "time"
@@ -249,7 +246,7 @@ GIVES = [
 @pytest.mark.sample(15)
 @pytest.mark.spread(10)
 @pytest.mark.parametrize(("kind", "keys"), GIVES)
-def test_what_a_measure_gives(varied: Mechanism, kind: str, keys: dict[str, str]) -> None:
+def test_what_a_measure_gives(varied, kind, keys):
     """A limit of another kind is a finding."""
     model = SLIDER if "S" in keys.values() else varied
     good = with_measure(model, **keys, limit=UNITS[kind], at_most=UNITS[kind])
@@ -269,13 +266,13 @@ def test_what_a_measure_gives(varied: Mechanism, kind: str, keys: dict[str, str]
         ("rssr", {"angle": "rocker"}, "add axis: x, y or z"),
     ],
 )
-def test_a_measure_that_the_structure_does_not_have(example: str, keys: dict[str, str], what: str) -> None:
+def test_a_measure_that_the_structure_does_not_have(example, keys, what):
     mechanism = Mechanism.read(next(path for path in EXAMPLES if path.stem == example))
     with pytest.raises(MechanismError, match=what):
         with_measure(mechanism, **keys)
 
 
-def test_place_and_window_of_a_measure_can_be_set(varied: Mechanism) -> None:
+def test_place_and_window_of_a_measure_can_be_set(varied):
     """Also where the file states none; what is no window says so."""
     bare = with_measure(varied, effort="A")
     for text in ("10 deg, 50 deg", "[10 deg, 50 deg]"):
@@ -288,7 +285,7 @@ def test_place_and_window_of_a_measure_can_be_set(varied: Mechanism) -> None:
         assert caught.value.findings[0].where == "measures.one.over"
 
 
-def test_no_coordinate_stands_for_an_end_of_a_range() -> None:
+def test_no_coordinate_stands_for_an_end_of_a_range():
     press = Mechanism.read(next(path for path in EXAMPLES if path.stem == "inverted-slider-crank"))
     name = next(name for name, driver in press.drivers.items() if driver.range)
     assert press.path_of(f"drivers.{name}.range.from") == f"drivers.{name}.range.from"

@@ -1,10 +1,7 @@
 """What varies and how, and what it costs: limits, distributions, correlations, formulas, processes, options."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,13 +13,13 @@ from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import rewrite_mechanism
 from trunnion.model.tolerance_parts import COST_MODELS, DISTRIBUTIONS, OPTIONS, Limits, Variation
-from trunnion.model.tolerances import FORMULA, Price, Tolerance
+from trunnion.model.tolerances import FORMULA, Price
 from trunnion.statistics import distributions
 
 DEG = np.pi / 180
 
 
-def of(mechanism: Mechanism) -> dict[str, Tolerance]:
+def of(mechanism):
     return {one.path: one for one in mechanism.tolerated()}
 
 
@@ -37,7 +34,7 @@ def of(mechanism: Mechanism) -> dict[str, Tolerance]:
         ("+0.02/-0.01", (-0.01, 0.02)), ("±0.1 deg", (-0.1 * DEG, 0.1 * DEG)), ("±2 * 0.05 mm", (-1e-4, 1e-4)),
     ],
 )  # fmt: skip
-def test_limits_as_written(text: float | str, expected: tuple[float, float]) -> None:
+def test_limits_as_written(text, expected):
     found = Limits.read(text)
     assert (found.lower.evaluate(), found.upper.evaluate()) == pytest.approx(expected, rel=1e-15)
     assert found.source == text
@@ -54,7 +51,7 @@ def test_limits_as_written(text: float | str, expected: tuple[float, float]) -> 
         ("±", "cannot be read"),
     ],
 )  # fmt: skip
-def test_what_are_no_limits(text: object, what: str) -> None:
+def test_what_are_no_limits(text, what):
     with pytest.raises(PydanticCustomError) as error:
         Limits.read(text)
     assert what in str(error.value)
@@ -77,7 +74,7 @@ VARIES = {
 }
 
 
-def test_every_number_that_varies_within_its_limits_and_how(varied: Mechanism) -> None:
+def test_every_number_that_varies_within_its_limits_and_how(varied):
     tolerated, names = of(varied), list(varied.parameters())
     assert list(tolerated) == sorted(tolerated, key=names.index)
     others = {"joints.C.pin.hole_radius", "joints.C.friction.coefficient", "joints.D.friction.coefficient"}
@@ -92,7 +89,7 @@ def test_every_number_that_varies_within_its_limits_and_how(varied: Mechanism) -
         assert found.direction == ("joints.B.misalignment.offset_towards" if path.endswith("offset") else "")
 
 
-def test_the_table_of_distributions_is_that_of_the_statistics() -> None:
+def test_the_table_of_distributions_is_that_of_the_statistics():
     """The model knows the names, so that reading a file does not import the mathematics of them."""
     declared = {name: tuple(one.parameters) for name, one in distributions.DISTRIBUTIONS.items()}
     assert declared == DISTRIBUTIONS
@@ -100,7 +97,7 @@ def test_the_table_of_distributions_is_that_of_the_statistics() -> None:
 
 
 # correlation
-def test_correlation(varied: Mechanism) -> None:
+def test_correlation(varied):
     matrix, paths = varied.correlation(), list(of(varied))
     expected = np.eye(len(paths))
     pairs = {("dimensions.AB", "dimensions.BC"): 0.5}
@@ -113,7 +110,7 @@ def test_correlation(varied: Mechanism) -> None:
 
 
 # deviations
-def test_a_deviation_is_added_and_passed_on() -> None:
+def test_a_deviation_is_added_and_passed_on():
     """A number that follows from another goes on to do so, unlike one that is replaced."""
     mechanism = Mechanism(
         dimensions={"a": "10 mm ± 0.1 mm", "b": "2 * a ± 0.05 mm"},
@@ -128,19 +125,19 @@ def test_a_deviation_is_added_and_passed_on() -> None:
     assert values["links.arm.points.P.y"] == pytest.approx(0.011, abs=1e-15)
     assert mechanism.parameters({"b": 0.05}, {"b": 1e-4})["links.arm.points.P.x"] == pytest.approx(0.0501, abs=1e-15)
     samples = mechanism.parameters(deviations={"a": np.array([[0.0], [1e-3]])})
-    assert samples["links.arm.points.P.x"].ravel() == pytest.approx([0.021, 0.023], abs=1e-15)  # type: ignore[union-attr]
+    assert samples["links.arm.points.P.x"].ravel() == pytest.approx([0.021, 0.023], abs=1e-15)
     assert derivative(mechanism.parameters(deviations={"a": Dual(0.0, 1.0)})["links.arm.points.P.x"]) == 2
     assert mechanism.parameters(deviations={}) == mechanism.parameters()
 
 
-def test_a_deviation_of_a_default_is_of_every_joint(varied: Mechanism) -> None:
+def test_a_deviation_of_a_default_is_of_every_joint(varied):
     values = varied.parameters(deviations={"joint_defaults.friction.coefficient": 0.05, "C.friction.coefficient": 0.01})
     found = [values[f"joints.{name}.friction.coefficient"] for name in "ABCD"]
     assert found == pytest.approx([0.1, 0.25, 0.26, 0.25], rel=1e-14)
 
 
 # another model
-def test_other_tolerances_are_written(varied: Mechanism, tmp_path: Path) -> None:
+def test_other_tolerances_are_written(varied, tmp_path):
     new = {"AB": 1.25e-5, "AD": 2e-5, "BC": 3e-5, "links.crank.mass": 0.01, "C.friction.coefficient": 0.001}
     changed = varied.with_tolerances({**new, "joints.A.clearance": 3e-5})
     changed.write(tmp_path / "model.yaml")
@@ -157,7 +154,7 @@ def test_other_tolerances_are_written(varied: Mechanism, tmp_path: Path) -> None
     assert list(again.variations)[: len(varied.variations)] == list(varied.variations)
 
 
-def test_tolerances_by_name_and_text(varied: Mechanism) -> None:
+def test_tolerances_by_name_and_text(varied):
     new = {"AB": "±0.1 mm", "dimensions.BC": "±1 um", "AD.cp": 1.5, "rocker.mass": 0.1}
     limits = {f"tolerances.{name}": value for name, value in new.items()}
     changed = varied.with_values({**limits, "measures.theta.limit": "0.3 deg"})
@@ -174,7 +171,7 @@ def test_tolerances_by_name_and_text(varied: Mechanism) -> None:
         varied.with_values({"tolerances.XY": "0.3 deg"})
 
 
-def test_without_friction_nothing_varies_that_is_not_there(varied: Mechanism) -> None:
+def test_without_friction_nothing_varies_that_is_not_there(varied):
     ideal = varied.with_friction("off")
     assert not [path for path in of(ideal) if "friction" in path]
     assert [one.of for one in ideal.correlations] == [("AB", "BC")]
@@ -193,7 +190,7 @@ def test_without_friction_nothing_varies_that_is_not_there(varied: Mechanism) ->
         ("d\r\n1e-5\r\n2e-5\r\n", (1e-5, 2e-5)),
     ],
 )
-def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expected: tuple[float, ...]) -> None:
+def test_a_sample_from_a_file(varied, tmp_path, text, expected):
     path = tmp_path / "sample.csv"
     path.write_text(text, encoding="utf-8")
     changed = varied.with_samples("CD", path)
@@ -221,7 +218,7 @@ def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expe
         ("AB", [1e-5], "is a list"),
     ],
 )  # fmt: skip
-def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: Any, what: str) -> None:
+def test_tolerances_that_cannot_be_replaced(varied, name, half, what):
     with pytest.raises(MechanismError, match=re.escape(what)):
         varied.with_tolerances({name: half})
 
@@ -233,9 +230,7 @@ def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: 
         ("1; 2\n3; 4\n", 1, "has 2 columns, a sample has 1"), ("0.01\n-0.02\n1e308\n", None, "finite"),
     ],
 )  # fmt: skip
-def test_a_sample_that_cannot_be_read(
-    varied: Mechanism, tmp_path: Path, text: str, line: int | None, what: str
-) -> None:
+def test_a_sample_that_cannot_be_read(varied, tmp_path, text, line, what):
     path = tmp_path / "sample.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(MechanismError) as error:
@@ -247,7 +242,7 @@ def test_a_sample_that_cannot_be_read(
 
 
 # limits that stand with the number
-def test_other_limits_stand_in_tolerances(varied: Mechanism) -> None:
+def test_other_limits_stand_in_tolerances(varied):
     """In the entry of the number, or else in a new one; the number itself then stands alone."""
     data = varied.data()
     data["joints"]["A"] = {**data["joints"]["A"], "friction": "0.1 ± 0.02"}
@@ -268,7 +263,7 @@ def test_other_limits_stand_in_tolerances(varied: Mechanism) -> None:
     assert Mechanism(**changed).with_tolerances(new, 4).data() == changed
 
 
-def test_a_model_with_less_in_it_is_rewritten(varied: Mechanism, tmp_path: Path) -> None:
+def test_a_model_with_less_in_it_is_rewritten(varied, tmp_path):
     """Entries that went, of a file in one line or another: the file that is written holds the mechanism."""
     (tmp_path / "source.yaml").write_text("# a four-bar\n" + VARIED, encoding="utf-8")
     bare = {key: one for key, one in varied.data().items() if key != "correlations"}
@@ -281,7 +276,7 @@ def test_a_model_with_less_in_it_is_rewritten(varied: Mechanism, tmp_path: Path)
     assert "AB: 31 mm, BC: 90 mm ± 0.02 mm" in (tmp_path / "named.yaml").read_text("utf-8")
 
 
-def test_what_is_said_of_a_joint_stands_against_what_is_said_of_all(varied: Mechanism) -> None:
+def test_what_is_said_of_a_joint_stands_against_what_is_said_of_all(varied):
     """A joint that follows the defaults in its number may have a tolerance of its own, whichever is said first."""
     names = ("joint_defaults.friction.coefficient", "B.friction.coefficient")
     for order in (names, names[::-1]):
@@ -297,7 +292,7 @@ def test_what_is_said_of_a_joint_stands_against_what_is_said_of_all(varied: Mech
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-def test_prices(varied: Mechanism) -> None:
+def test_prices(varied):
     """In the order of the file, in SI; without that of a number that varies as measured."""
     found = {one.path: one for one in varied.prices()}
     assert list(found) == [f"dimensions.{name}" for name in ("AB", "BC", "CD", "AD")] + ["joints.A.clearance"]
@@ -309,7 +304,7 @@ def test_prices(varied: Mechanism) -> None:
     assert (play.play, play.model, play.parameters["unit"]) == (True, "power", 1.0)
 
 
-def test_choices_are_from_the_cheapest_on(varied: Mechanism) -> None:
+def test_choices_are_from_the_cheapest_on(varied):
     found = {one.path: one.choices for one in varied.prices()}
     grades = [(one.name, one.tolerance, one.cost) for one in found["dimensions.CD"]]
     assert grades == [("IT8", 23e-6, 6.0), ("IT7", 15e-6, 9.0)]  # of 70 mm: IT7 30 µm, IT8 46 µm
@@ -317,7 +312,7 @@ def test_choices_are_from_the_cheapest_on(varied: Mechanism) -> None:
     assert ways == [("milled", 5e-5, 3.0), ("ground", 1e-5, 9.0)]
 
 
-def test_bought_by_the_grade() -> None:
+def test_bought_by_the_grade():
     mechanism = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml")
     prices = {one.path: one for one in mechanism.prices()}
     assert [one.name for one in prices["dimensions.l1"].choices] == ["IT11", "IT10", "IT9", "IT8", "IT7", "IT6"]
@@ -327,14 +322,14 @@ def test_bought_by_the_grade() -> None:
     assert {one.path: one.upper for one in chosen.tolerated()}["dimensions.l1"] == pytest.approx(110e-6)
 
 
-def test_the_keys_of_a_formula_are_those_of_its_model() -> None:
+def test_the_keys_of_a_formula_are_those_of_its_model():
     costs = pytest.importorskip("trunnion.statistics.costs")
     assert set(costs.COST_MODELS) == set(COST_MODELS)
     for one in costs.COST_MODELS.values():
         assert set(one.parameters) == {*FORMULA, "unit"}
 
 
-def test_a_play_of_a_radius_is_not_for_sale() -> None:
+def test_a_play_of_a_radius_is_not_for_sale():
     data = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml").data()
     data["joints"]["B"]["pin"] = {"radius": "6 mm", "hole_radius": "6.01 mm"}
     with pytest.raises(

@@ -1,9 +1,5 @@
 """Every distribution: quantile and its inverse, moments, tails; against scipy.stats, integration and mpmath."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +9,7 @@ from scipy import stats
 from trunnion.statistics.distributions import DISTRIBUTIONS, normal_parameters
 
 LOW, HIGH = -2e-5, 5e-5
-CASES: list[tuple[str, dict[str, Any], Any]] = [
+CASES = [
     ("normal", {}, stats.norm(1.5e-5, 7e-5 / 6)),
     ("normal", {"cp": 1.5}, stats.norm(1.5e-5, 7e-5 / 9)),
     ("normal", {"cp": 1.33, "cpk": 1.0}, stats.norm(1.5e-5 + 0.33 * 7e-5 / 6 / 1.33 * 3, 7e-5 / 6 / 1.33)),
@@ -37,7 +33,7 @@ SAMPLE = (3e-6, -1e-6, 2e-6, 2e-6)
 
 
 @pytest.mark.parametrize(("name", "options", "known"), CASES, ids=IDS)
-def test_as_in_scipy(name: str, options: dict[str, Any], known: Any) -> None:
+def test_as_in_scipy(name, options, known):
     kind, scale = DISTRIBUTIONS[name], known.std()
     middle = GRID[(GRID > 1e-9) & (GRID < 1 - 1e-9)]
     np.testing.assert_allclose(
@@ -51,7 +47,7 @@ MIRRORED = {"normal": "shift", "truncated": "shift", "triangular": "mode"}
 
 
 @pytest.mark.parametrize(("name", "options", "known"), CASES, ids=IDS)
-def test_mirrored_to_the_last_bits(name: str, options: dict[str, Any], known: Any) -> None:
+def test_mirrored_to_the_last_bits(name, options, known):
     """−x has the mirrored distribution: the upper tail is as exact as the lower."""
     kind, mirrored = DISTRIBUTIONS[name], dict(options)
     if name == "beta":
@@ -68,7 +64,7 @@ def test_mirrored_to_the_last_bits(name: str, options: dict[str, Any], known: An
 
 
 @pytest.mark.parametrize("shift", [-2e-4, 1.5e-4, 3.0])
-def test_cut_off_far_from_the_mean(shift: float) -> None:
+def test_cut_off_far_from_the_mean(shift):
     """A mean far beyond a limit: against mpmath; so far that only logarithms are left (3 m): exponential."""
     mpmath = pytest.importorskip("mpmath")
     kind, options = DISTRIBUTIONS["truncated"], {"cp": 1.0, "shift": shift}
@@ -93,7 +89,7 @@ def test_cut_off_far_from_the_mean(shift: float) -> None:
 
 
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=30))
-def test_sample_is_the_empirical_distribution(values: list[float]) -> None:
+def test_sample_is_the_empirical_distribution(values):
     """Every value is drawn by an equal part of (0, 1), in order of size."""
     kind, options = DISTRIBUTIONS["sample"], {"values": tuple(values)}
     n = len(values)
@@ -103,7 +99,7 @@ def test_sample_is_the_empirical_distribution(values: list[float]) -> None:
     assert kind.moments(0, 0, options)[1] == pytest.approx(np.var(values), abs=1e-15)
 
 
-def test_quantile_of_a_sample_at_its_steps() -> None:
+def test_quantile_of_a_sample_at_its_steps():
     """The least value with F(x) ≥ u: at u = k/n the kth smallest, the next one just above."""
     kind, values = DISTRIBUTIONS["sample"], (5.0, -2.0, 7.0, 1.0)
     steps = np.arange(1, 5) / 4

@@ -1,7 +1,5 @@
 """Random numbers by place: Philox worked out here, Sobol nets, correlated numbers; any part the same bits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +11,7 @@ from trunnion.statistics.draws import Marginal, Population, correlated, factor, 
 MASK = (1 << 64) - 1
 
 
-def philox(counter: list[int], key: list[int]) -> list[int]:
+def philox(counter, key):
     """Philox4x64-10 of Salmon et al. (2011), in whole numbers."""
     c, k = list(counter), list(key)
     for _ in range(10):
@@ -23,7 +21,7 @@ def philox(counter: list[int], key: list[int]) -> list[int]:
     return c
 
 
-def test_philox_known_answer() -> None:
+def test_philox_known_answer():
     """The authors' test vector for counter 0, key 0 (Random123, kat_vectors)."""
     known = [0x16554D9ECA36314C, 0xDB20FE9D672D0FDC, 0xD7E772CEE186176B, 0x7E68B68AEC7BA23B]
     assert philox([0, 0, 0, 0], [0, 0]) == known
@@ -31,13 +29,13 @@ def test_philox_known_answer() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2**64 + 5, 2**128 - 1])
 @pytest.mark.parametrize("block", [0, 7, 2**40])
-def test_uniforms_are_philox(seed: int, block: int) -> None:
+def test_uniforms_are_philox(seed, block):
     words = [w for n in range(1, 4) for w in philox([n, 0, block, 0], [seed & MASK, seed >> 64])]
     expected = (np.array([w >> 12 for w in words], dtype=np.float64) + 0.5) / 2**52
     np.testing.assert_array_equal(uniforms(seed, block, 4, 3), expected.reshape(3, 4).T)
 
 
-def test_seed_out_of_range() -> None:
+def test_seed_out_of_range():
     with pytest.raises(ValueError, match="seed -1"):
         uniforms(-1, 0, 1, 1)
 
@@ -45,13 +43,13 @@ def test_seed_out_of_range() -> None:
 # Sobol
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**50), st.integers(0, 50), st.integers(1, 9), st.integers(0, 2**14), st.integers(1, 40))
-def test_any_part_the_same_bits(seed: int, replicate: int, dims: int, first: int, count: int) -> None:
+def test_any_part_the_same_bits(seed, replicate, dims, first, count):
     together = sobol(seed, replicate, dims, first, count + 7)
     np.testing.assert_array_equal(sobol(seed, replicate, dims, first + 7, count), together[:, 7:])
 
 
 @pytest.mark.parametrize("replicate", [0, 3])
-def test_scrambled_points_are_a_net(replicate: int) -> None:
+def test_scrambled_points_are_a_net(replicate):
     """Every 2ᵐ points from a multiple of 2ᵐ on have one in each 2ᵐth of every axis; 1, 2 are a (0, m, 2)-net."""
     for first in (0, 1 << 10, 7 << 10):
         points = sobol(5, replicate, 20, first, 1 << 10)
@@ -65,7 +63,7 @@ def test_scrambled_points_are_a_net(replicate: int) -> None:
 
 # correlation
 @given(st.integers(0, 1000), st.integers(1, 8), st.integers(1, 8))
-def test_factor_of_any_rank(seed: int, size: int, rank: int) -> None:
+def test_factor_of_any_rank(seed, size, rank):
     rows = np.random.default_rng(seed).normal(size=(size, rank))
     rows /= np.linalg.norm(rows, axis=1)[:, None]
     lower = factor(rows @ rows.T)
@@ -77,12 +75,12 @@ def test_factor_of_any_rank(seed: int, size: int, rank: int) -> None:
     "matrix",
     [[[1, 1.1], [1.1, 1]], [[1, 1, 0], [1, 1, 0.5], [0, 0.5, 1]], [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]]],
 )
-def test_contradictory_correlations(matrix: list[list[float]]) -> None:
+def test_contradictory_correlations(matrix):
     with pytest.raises(ValueError, match="contradict"):
         factor(matrix)
 
 
-def test_correlated_normal_scores() -> None:
+def test_correlated_normal_scores():
     matrix = np.array([[1, 0.5, -0.3], [0.5, 1, 0.2], [-0.3, 0.2, 1]])
     u = correlated(uniforms(4, 0, 3, 200_000), factor(matrix))
     assert all(stats.kstest(row, "uniform").pvalue > 1e-3 for row in u)
@@ -100,7 +98,7 @@ for i, j, r in ((0, 2, 0.6), (0, 1, -0.4), (2, 4, 0.3)):
 U = uniforms(2, 5, 7, 200_000)
 
 
-def test_correlated_as_by_the_copula() -> None:
+def test_correlated_as_by_the_copula():
     population = Population(MARGINALS, MATRIX)
     drawn, u = population.draw(U), correlated(U, factor(MATRIX))
     for row, marginal in enumerate(MARGINALS):
@@ -113,7 +111,7 @@ def test_correlated_as_by_the_copula() -> None:
     assert stats.kstest(one - two, "norm", (0, np.sqrt(2 - 2 * 0.6))).pvalue > 1e-3
 
 
-def test_covariance_in_closed_form() -> None:
+def test_covariance_in_closed_form():
     """Normal: ρ σ σ. Uniform with uniform: (6/π) asin(ρ/2) times the variances; with normal: ρ √(3/π)."""
     marginals = [
         Marginal("normal", -3, 3), Marginal("uniform", -1, 1), Marginal("uniform", -1, 1), Marginal("normal", 0, 1),

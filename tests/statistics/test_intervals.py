@@ -1,7 +1,5 @@
 """Moments, intervals and capability against SciPy; intervals of 95 % cover in 95 ± 3 % over 200 seeds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -23,7 +21,7 @@ from trunnion.statistics.intervals import (
 
 
 @pytest.mark.parametrize("middle", [0.0, 1e6])
-def test_moments_are_those_of_scipy(middle: float) -> None:
+def test_moments_are_those_of_scipy(middle):
     values = middle + np.random.default_rng(3).gamma(2.0, size=(3, 500))
     values[1, ::7] = np.nan
     found = moments_of(values)
@@ -36,7 +34,7 @@ def test_moments_are_those_of_scipy(middle: float) -> None:
         assert found.kurtosis[i] == pytest.approx(stats.kurtosis(x, fisher=False), rel=1e-8)
 
 
-def test_what_does_not_exist_is_nan() -> None:
+def test_what_does_not_exist_is_nan():
     found = moments_of(np.array([[np.nan, np.nan], [np.nan, 2.0], [2.0, 2.0], [np.inf, 1.0]]))
     np.testing.assert_array_equal(found.number, [0, 1, 2, 2])
     np.testing.assert_array_equal(found.mean, [np.nan, 2.0, 2.0, np.inf])
@@ -49,7 +47,7 @@ GENERATOR = np.random.default_rng(8)
 
 
 @given(st.integers(1, 10**6), st.floats(0, 1))
-def test_wilson_as_in_scipy(n: int, part: float) -> None:
+def test_wilson_as_in_scipy(n, part):
     passed = round(part * n)
     known = stats.binomtest(passed, n).proportion_ci(0.95, "wilson")
     low, high = share(passed, n)
@@ -57,14 +55,14 @@ def test_wilson_as_in_scipy(n: int, part: float) -> None:
     assert 0 <= low <= passed / n <= high <= 1
 
 
-def test_replicates_as_a_t_test() -> None:
+def test_replicates_as_a_t_test():
     values = GENERATOR.normal(size=(3, 8))
     known = stats.ttest_1samp(values, 0, axis=1).confidence_interval(0.95)
     np.testing.assert_allclose(by_replicates(values), [known.low, known.high], rtol=1e-12)
     assert np.isnan(by_replicates([1.0])).all()
 
 
-def test_shares_of_replicates() -> None:
+def test_shares_of_replicates():
     """Far from the ends it is the t interval of the shares; at the ends Wilson's of all points."""
     passed = np.array([5003, 4990, 5011, 4998, 5007, 4995, 5001, 4992])
     np.testing.assert_allclose(share_by_replicates(passed, 10_000), by_replicates(passed / 10_000), atol=1e-8)
@@ -74,7 +72,7 @@ def test_shares_of_replicates() -> None:
     assert 0.897 < low < 0.9 < high < 0.903
 
 
-def test_mean_and_deviation_of_normal_values() -> None:
+def test_mean_and_deviation_of_normal_values():
     n = 12
     x = GENERATOR.normal(size=n)
     known = stats.ttest_1samp(x, 0).confidence_interval(0.95)
@@ -88,7 +86,7 @@ def test_mean_and_deviation_of_normal_values() -> None:
     assert np.isnan(of_deviation(1.0, np.nan, 50)).all()
 
 
-def test_binomial_quantiles_as_in_scipy() -> None:
+def test_binomial_quantiles_as_in_scipy():
     n = np.array([1, 2, 10, 777, 10**6, 10**12])
     for q in (0.00135, 0.3, 0.5, 0.99865):
         low, high = of_quantile(q, n)
@@ -106,7 +104,7 @@ def test_binomial_quantiles_as_in_scipy() -> None:
         ((-np.inf, np.inf), 1.0, 1.0, (np.nan, np.nan)),
     ],
 )  # fmt: skip
-def test_capability(limits: tuple[float, float], mean: float, sigma: float, expected: tuple[float, float]) -> None:
+def test_capability(limits, mean, sigma, expected):
     np.testing.assert_allclose(capability(*limits, mean, sigma), expected)
 
 
@@ -116,25 +114,25 @@ REPLICATES = 16
 HONEST = pytest.approx(0.95, abs=0.03 + 1e-12)
 
 
-def yield_of(limit: float) -> float:
+def yield_of(limit):
     return float(ndtr(limit) - ndtr(-limit))
 
 
-def passed(u: np.ndarray, limit: float) -> int:
+def passed(u, limit):
     return int(np.count_nonzero(np.abs(WEIGHTS @ POPULATION.draw(u)) <= limit))
 
 
-def coverage(low: np.ndarray, high: np.ndarray, true: float) -> float:
+def coverage(low, high, true):
     return float(np.mean((low <= true) & (true <= high)))
 
 
 @pytest.mark.parametrize(("limit", "count"), [(1.0, 500), (2.0, 2000), (3.0, 5000)])
-def test_plain_samples(limit: float, count: int) -> None:
+def test_plain_samples(limit, count):
     counts = [passed(uniforms(seed, 0, 3, count), limit) for seed in range(1, 201)]
     assert coverage(*share(counts, count), yield_of(limit)) == HONEST
 
 
-def counts_of(limit: float, count: int) -> np.ndarray:
+def counts_of(limit, count):
     """Samples within ±limit, (seed, replicate)."""
     replicates = range(REPLICATES)
     return np.array([[passed(sobol(s, r, 3, 0, count), limit) for r in replicates] for s in range(1, 201)])
@@ -142,7 +140,7 @@ def counts_of(limit: float, count: int) -> np.ndarray:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize(("limit", "count"), [(1.0, 128), (2.0, 256), (3.0, 1024)])
-def test_sobol_by_replicates(limit: float, count: int) -> None:
+def test_sobol_by_replicates(limit, count):
     counts, true = counts_of(limit, count), yield_of(limit)
     assert coverage(*by_replicates(counts / count), true) == HONEST
     assert coverage(*share_by_replicates(counts, count), true) == HONEST
@@ -154,7 +152,7 @@ def test_sobol_by_replicates(limit: float, count: int) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("law", ["normal", "uniform", "exponential"])
-def test_mean_and_deviation_are_covered(law: str) -> None:
+def test_mean_and_deviation_are_covered(law):
     n, (mean, sigma) = 2000, {"normal": (0, 1), "uniform": (0.5, 12**-0.5), "exponential": (1, 1)}[law]
     x = getattr(GENERATOR, law)(size=(RUNS, n))
     s, d = x.std(axis=1, ddof=1), x - x.mean(axis=1)[:, None]
@@ -166,7 +164,7 @@ def test_mean_and_deviation_are_covered(law: str) -> None:
 
 
 @pytest.mark.slow
-def test_hardly_any_failure() -> None:
+def test_hardly_any_failure():
     """One failure expected in all: the counts of replicates are 0 or 1, and t alone would cover in 2 of 3 studies."""
     counts, true = counts_of(4.0, 1024), yield_of(4.0)
     assert coverage(*by_replicates(counts / 1024), true) < 0.75

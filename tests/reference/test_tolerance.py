@@ -23,7 +23,7 @@ from toleranced import (
     slopes,
 )  # fmt: skip
 from toleranced import slider_crank as sized_slider
-from trunnion.statistics.draws import uniforms
+from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.linear import study
 
 FAST = ("linear", "worst-case")

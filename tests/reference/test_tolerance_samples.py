@@ -20,7 +20,7 @@ from toleranced import (
     slider_crank,
     slider_place,
 )  # fmt: skip
-from trunnion.statistics.draws import sobol, uniforms
+from trunnion.statistics.distributions import sobol, uniforms
 from trunnion.studies.tolerance.linear import study
 
 MM = 1e-3

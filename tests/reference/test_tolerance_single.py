@@ -15,7 +15,7 @@ from trunnion.measures.positions import moved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.run import prepare
-from trunnion.statistics.draws import uniforms
+from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.linear import study
 
 STEPS = 25

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import ndtr
 
-from trunnion.statistics.draws import Marginal, Population, sobol, uniforms
+from trunnion.statistics.distributions import Marginal, Population, sobol, uniforms
 from trunnion.statistics.intervals import (
     by_replicates,
     capability,

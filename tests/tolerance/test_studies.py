@@ -10,7 +10,7 @@ import trunnion
 from mechanisms_parts import example
 from toleranced import FOURBAR, fourbar, fourbar_angle, many
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.statistics.draws import uniforms
+from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.linear import study
 
 LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}

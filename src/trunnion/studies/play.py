@@ -39,7 +39,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 from trunnion.results.quantities import readable
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.statistics.draws import Population
+from trunnion.statistics.distributions import Population
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.inputs import Inputs, plays_of
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, stated_or_outputs

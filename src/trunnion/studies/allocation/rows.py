@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.scales import scales_of
 from trunnion.model.tolerances import Tolerance
-from trunnion.statistics.draws import Marginal
+from trunnion.statistics.distributions import Marginal
 from trunnion.studies.allocation.problem import AllocationProblem, Criterion, RowEffects
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStudy, sound

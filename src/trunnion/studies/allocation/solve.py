@@ -28,7 +28,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.statistics.costs import COST_MODELS, Cost
-from trunnion.statistics.draws import factor
+from trunnion.statistics.distributions import factor
 from trunnion.studies.allocation.problem import (
     ALLOWED,
     PROVEN,

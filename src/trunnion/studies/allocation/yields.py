@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtr, ndtr, ndtri
 
 from trunnion.errors import Finding, Severity
-from trunnion.statistics.draws import factor, sobol
+from trunnion.statistics.distributions import factor, sobol
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield
 from trunnion.studies.allocation.solve import cheapest
 

@@ -22,7 +22,7 @@ from trunnion.model.tolerances import FULL_TURN, Tolerance
 from trunnion.solve import shifts
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import Play, given_offsets
-from trunnion.statistics.draws import Marginal, Population, correlated
+from trunnion.statistics.distributions import Marginal, Population, correlated
 
 Array = NDArray[np.float64]
 

@@ -33,7 +33,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.walk_kernel import WalkKernel
-from trunnion.statistics.draws import uniforms
+from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.inputs import Inputs
 
 AT_ONCE = 1 << 20  # numbers in an array of the compiled engine

@@ -23,7 +23,7 @@ from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.statistics.draws import sobol, uniforms
+from trunnion.statistics.distributions import sobol, uniforms
 from trunnion.studies.batch import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import kernel_of, many_of

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -38,7 +38,7 @@ from trunnion.rig.identification.fit import (
     sizes_of,
     solved,
 )  # fmt: skip
-from trunnion.rig.identification.signals import DriveCycle, Model, Parameters, paths_of, unknowns
+from trunnion.rig.identification.signals import Model, Parameters, paths_of, unknowns
 from trunnion.rig.identification.uncertainty import (
     CONFIDENCE,
     Covariances,
@@ -189,7 +189,7 @@ def identify(
         fit = replace(fit, inflation=spread.excess)
         best = best._replace(x=solved(fit, best.x).x)
         spread = spread_of(fit, best.x)
-    return _Identified(mechanism, measurement, fit, best, spread, encoder).dataset()
+    return _result(mechanism, measurement, fit, best, spread, encoder)
 
 
 # ---- the data and the model -----------------------------------------------------------------------------------
@@ -301,213 +301,175 @@ def _runnable(fit: Fit) -> Array:
 # ---- the result -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Identified:
-    """An identification, with the figures of its unknowns and, behind them, of the errors of its sensors.
+def _result(
+    mechanism: Mechanism, measurement: Measurement, fit: Fit, solution: Solution, spread: Covariances, encoder: str
+) -> xr.Dataset:
+    """Estimates with their uncertainty, residuals and findings, errors and warnings first.
 
     encoder: path of an unknown by which the encoder of the data is off, no number of the mechanism; empty without.
     """
+    model, conditions, n, x = fit.model, measurement.conditions, fit.count, solution.x
+    names, system = [unknown.name for unknown in model.unknowns], model.run.system
+    drive = next(iter(mechanism.drivers), "")
+    groups = inseparable(fit, x, spread)
+    figures = _figures(fit, x, spread, groups)
+    lost, u = figures["lost"], figures["standard_uncertainty"]
+    variances = np.array([*map(np.diagonal, spread.parts.values())])
+    sizes = [{abs(error.angle)} if error.angle else set(error.sizes[error.sizes != 0]) for error in fit.sensors]
+    arrays = {
+        **_residuals(fit, x, spread, conditions),
+        **{name: row[:n] for name, row in figures.items()},
+        "start": fit.start[:n],
+        "degrees_of_freedom": spread.freedom[:n],
+        "told": (~lost & ~figures["vague"])[:n].astype(np.int8),
+        "correlation": np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0),
+        "share": np.where(lost[:n, None], np.nan, (variances / np.sum(variances, axis=0))[:, :n].T),
+        "sensor_error": np.where(lost, np.nan, x)[n:],
+        "sensor_uncertainty": u[n:],
+        "sensor_size": np.array([size.pop() if len(size) == 1 else np.nan for size in sizes]),
+        "reduced_chi_squared": np.asarray(spread.test.reduced),
+        "chi_squared_freedom": np.asarray(spread.test.freedom),
+        "chi_squared_chance": np.asarray(spread.test.chance),
+        "turn_correlation": np.asarray(spread.follows),
+    }
+    labels = {
+        "parameter": names, "parameter_2": names, "source": list(spread.parts),
+        "sensor": [error.name for error in fit.sensors], "channel": list(model.measures),
+        "condition": [condition.name for condition in conditions],
+    }  # fmt: skip
+    evaluations = fit.evaluate.cache_info().misses  # without those that tell what refutes the estimates
+    refuting = {} if spread.test.gross else _refuting(fit, x, spread)
+    values = np.asarray(np.where(lost, fit.start, x)[:n])
+    cycles = [model.cycle(k, values) for k in range(len(conditions))]
+    ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in cycles]
+    speeds = [(conditions[k], cycles[k].speed) for k in sorted({fit.blocks[k].condition for k in fit.fitted})]
+    findings = [
+        *other_speed(drive, speeds),
+        *_of_fit(fit, solution, spread, lost, spread.test.gross or bool(refuting), float(arrays["hold_out_ratio"])),
+        *_of_unknowns(fit, x, spread.test.gross, figures, groups, refuting),
+    ]
+    attributes = {
+        "name": mechanism.name,
+        "identified": measurement.name,
+        **origin(mechanism, system.plan.formula),
+        "confidence": CONFIDENCE,
+        "encoder": encoder,
+        "parameter_paths": [unknown.paths for unknown in model.unknowns],
+        "parameter_units": [unknown.unit for unknown in model.unknowns],
+        "channel_units": [measure.unit(system) for measure in model.measures.values()],
+        "channel_measures": [measure.name for measure in model.measures.values()],
+        "drive": drive,
+        # angles of the first driver where the cycle begins and ends, rad; None if they name no position
+        "drive_range": [list(pair) if np.isfinite(pair).all() else None for pair in ends],
+        "files": [list(condition.files) for condition in conditions],
+        **of_data(measurement),
+        "inputs": inputs(mechanism),
+        "evaluations": evaluations,
+        "converged": int(solution.converged),
+        "references": "\n".join([*SOURCES, *references(mechanism)]),
+        "findings": finding_rows(sorted(findings, key=lambda finding: list(Severity).index(finding.severity))),
+    }
+    variables = described({name: arrays[name] for name in VARIABLES}, VARIABLES)
+    return dataset_of("identification", variables, labels, attributes)
 
-    mechanism: Mechanism
-    measurement: Measurement
-    fit: Fit
-    solution: Solution
-    spread: Covariances
-    encoder: str
 
-    @property
-    def x(self) -> Array:
-        """Where the search ended."""
-        return self.solution.x
+def _figures(fit: Fit, x: Array, spread: Covariances, groups: Sequence[tuple[int, ...]]) -> dict[str, NDArray[Any]]:
+    """Of unknowns and, behind them, of errors of sensors: estimate, uncertainty and 95 % interval within the limits.
 
-    @cached_property
-    def groups(self) -> list[tuple[int, ...]]:
-        """Unknowns that the data do not separate, by their places."""
-        return inseparable(self.fit, self.x, self.spread)
+    limit: that an estimate is on, −1, 0 or 1; the interval is then one-sided, from where a step without limits ends if
+    that is inside. lost: what the data do not tell; half: of a two-sided interval, whether they do or not; vague: whose
+    interval is wider than twice itself, or than its limits are apart.
+    """
+    (low, high), half = fit.bounds, quantile(spread.freedom) * spread.deviation
+    lost = np.isin(np.arange(len(x)), [member for group in groups for member in group])
+    u = np.where(lost, np.nan, spread.deviation)
+    step = -spread.inverse @ (fit.jacobian(x).T @ fit.residuals(x))
+    near = AT_LIMIT * np.nan_to_num(u) + 1e-9 * np.abs(x)
+    upper, lower = (~lost & (gap <= near) for gap in (high - x, x - low))
+    limit = np.where(upper & (step >= 0), 1, np.where(lower & (step <= 0), -1, 0))
+    estimate = np.where(lost, np.nan, np.where(limit < 0, low, np.where(limit > 0, high, x)))
+    one_sided = quantile(spread.freedom, one_sided=True) * u
+    least = np.where(limit > 0, np.minimum(x + step, high) - one_sided, np.where(limit < 0, low, estimate - half))
+    most = np.where(limit < 0, np.maximum(x + step, low) + one_sided, np.where(limit > 0, high, estimate + half))
+    return {
+        "limit": limit.astype(np.int8), "estimate": estimate, "standard_uncertainty": u,
+        "lower": np.maximum(least, low), "upper": np.minimum(most, high),
+        "lost": lost, "half": half, "vague": (half > np.minimum(sizes_of(fit, x), (high - low) / 2)) & ~lost,
+    }  # fmt: skip
 
-    @cached_property
-    def lost(self) -> NDArray[np.bool_]:
-        """What the data do not tell."""
-        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group])
 
-    @cached_property
-    def half(self) -> Array:
-        """Half of a two-sided 95 % interval, whether the data tell the unknown or not."""
-        return np.asarray(quantile(self.spread.freedom) * self.spread.deviation)
+def _refuting(fit: Fit, x: Array, spread: Covariances) -> dict[int, float]:
+    """What errors of sensors come to with nothing stated of them, by place, where that is far off: of those at their
+    limit, and of those without which there is hardly a misfit."""
+    test, excess = spread.test, dict[int, float]()
+    fit = replace(fit, inflation=1.0) if test.misfit else fit
+    for s, (error, size) in enumerate(zip(fit.sensors, x[fit.count :], strict=True)):
+        at_limit = abs(size) > NEAR_LIMIT * error.most
+        if error.stated and (at_limit or test.misfit):
+            free = replace(fit, sensors=[*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]])
+            end = solved(free, x).x
+            explained = at_limit or lack_of_fit(free, end).reduced - 1 < UNEXPLAINED * (test.reduced - 1)
+            if explained and abs(end[fit.count + s]) >= FAR:
+                excess[s] = float(end[fit.count + s])
+    return excess
 
-    @cached_property
-    def vague(self) -> NDArray[np.bool_]:
-        """Unknowns whose 95 % interval is wider than twice themselves, or than their limits are apart."""
-        low, high = self.fit.bounds
-        return np.asarray((self.half > np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)) & ~self.lost)
 
-    @cached_property
-    def refuting(self) -> dict[int, float]:
-        """What errors of sensors come to with nothing stated of them, by place, where that is far off: of those at
-        their limit, and of those without which there is hardly a misfit."""
-        test, excess = self.spread.test, dict[int, float]()
-        fit = replace(self.fit, inflation=1.0) if test.misfit else self.fit
-        for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
-            at_limit = abs(size) > NEAR_LIMIT * error.most
-            if error.stated and (at_limit or test.misfit):
-                free = replace(fit, sensors=[*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]])
-                x = solved(free, self.x).x
-                explained = at_limit or lack_of_fit(free, x).reduced - 1 < UNEXPLAINED * (test.reduced - 1)
-                if explained and abs(x[fit.count + s]) >= FAR:
-                    excess[s] = float(x[fit.count + s])
-        return excess
-
-    @property
-    def refuted(self) -> bool:
-        """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.refuting)
-
-    def intervals(self) -> dict[str, NDArray[Any]]:
-        """Limit that an estimate is on, −1, 0 or 1, the estimate, and its 95 % interval within the limits.
-
-        On a limit the interval is one-sided, from where a step without limits ends if that is inside.
-        """
-        (low, high), x, u = self.fit.bounds, self.x, np.where(self.lost, np.nan, self.spread.deviation)
-        step = -self.spread.inverse @ (self.fit.jacobian(x).T @ self.fit.residuals(x))
-        near = AT_LIMIT * np.nan_to_num(u) + 1e-9 * np.abs(x)
-        upper, lower = (~self.lost & (gap <= near) for gap in (high - x, x - low))
-        limit = np.where(upper & (step >= 0), 1, np.where(lower & (step <= 0), -1, 0))
-        estimate = np.where(self.lost, np.nan, np.where(limit < 0, low, np.where(limit > 0, high, x)))
-        half, one_sided = quantile(self.spread.freedom) * u, quantile(self.spread.freedom, one_sided=True) * u
-        least = np.where(limit > 0, np.minimum(x + step, high) - one_sided, estimate - half)
-        most = np.where(limit < 0, np.maximum(x + step, low) + one_sided, estimate + half)
-        least, most = np.where(limit < 0, low, least), np.where(limit > 0, high, most)
-        figures = {"limit": limit.astype(np.int8), "estimate": estimate, "standard_uncertainty": u}
-        return figures | {"lower": np.maximum(least, low), "upper": np.minimum(most, high)}
-
-    @cached_property
-    def by_block(self) -> dict[str, NDArray[Any]]:
-        """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
-        fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
-        longest = max(len(condition.phase) for condition in conditions)
-        sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
-        arrays = {name: var.blank(sizes) for name, var in VARIABLES.items() if var.dims and {*var.dims} <= {*sizes}}
-        for k, condition in enumerate(conditions):
-            arrays["phase"][k, : len(condition.phase)] = condition.phase
-        allowed = fit.allowed(self.x)
-        for k, block in enumerate(fit.blocks):
-            at, signal, mask = (channels.index(block.channel), block.condition), block.signal, fit.masks[k]
-            mask = allowed[k] if block.held else mask
-            before, after = (np.where(mask, fit.gap(x, k), np.nan) for x in (fit.start, self.x))
-            # of the positions that are used: beside jumps turns scatter more
-            variance, rows = block.pooled(mask) / np.maximum(signal.count, 1), dict[str, Array]()
-            figures: dict[str, float]
-            if block.held:
-                columns = np.where(mask, np.nan_to_num(fit.reading(self.x, k)[1]), 0.0)
-                predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
-                expected = np.where(mask, np.sqrt(variance + predicted), np.nan)
-                figures = {"held_out_turns": len(signal.turns), "held_out_before": rms(before),
-                           "held_out_after": rms(after), "held_out_expected": rms(expected)}  # fmt: skip
-            else:
-                expected = np.where(mask & block.repeats, np.sqrt(variance + block.unresolved**2), np.nan)
-                rows = {"measured": signal.mean, "residual_before": before, "residual_after": after,
-                        "residual_uncertainty": expected}  # fmt: skip
-                figures = {"turns": len(signal.turns), "rms_before": rms(before), "rms_after": rms(after),
-                           "rms_expected": rms(expected), "used": int(np.count_nonzero(mask)),
-                           "left_out": int(np.count_nonzero(np.isfinite(signal.mean) & ~mask))}  # fmt: skip
-            for name, row in rows.items():
-                arrays[name][at][: len(row)] = row
-            for name, figure in figures.items():
-                arrays[name][at] = figure
-        return arrays
-
-    @property
-    def hold_out_ratio(self) -> float:
-        """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
-        return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])
-
-    @cached_property
-    def cycles(self) -> list[DriveCycle]:
-        """The cycle in every condition, with the estimates."""
-        values = np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
-        return [self.fit.model.cycle(k, values) for k in range(len(self.measurement.conditions))]
-
-    def dataset(self) -> xr.Dataset:
-        """Estimates with their uncertainty, residuals and findings."""
-        fit, measurement, mechanism, spread, n = self.fit, self.measurement, self.mechanism, self.spread, self.fit.count
-        model, conditions, intervals = fit.model, measurement.conditions, self.intervals()
-        names, system = [unknown.name for unknown in model.unknowns], model.run.system
-        u, variances = intervals["standard_uncertainty"], np.array([*map(np.diagonal, spread.parts.values())])
-        sizes = [{abs(error.angle)} if error.angle else set(error.sizes[error.sizes != 0]) for error in fit.sensors]
-        arrays = {
-            **self.by_block,
-            **{name: figures[:n] for name, figures in intervals.items()},
-            "start": fit.start[:n],
-            "degrees_of_freedom": spread.freedom[:n],
-            "told": (~self.lost & ~self.vague)[:n].astype(np.int8),
-            "correlation": np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0),
-            "share": np.where(self.lost[:n, None], np.nan, (variances / np.sum(variances, axis=0))[:, :n].T),
-            "sensor_error": np.where(self.lost, np.nan, self.x)[n:],
-            "sensor_uncertainty": u[n:],
-            "sensor_size": np.array([size.pop() if len(size) == 1 else np.nan for size in sizes]),
-            "reduced_chi_squared": np.asarray(spread.test.reduced),
-            "chi_squared_freedom": np.asarray(spread.test.freedom),
-            "chi_squared_chance": np.asarray(spread.test.chance),
-            "turn_correlation": np.asarray(spread.follows),
-            "hold_out_ratio": np.asarray(self.hold_out_ratio),
-        }
-        labels = {
-            "parameter": names, "parameter_2": names, "source": list(spread.parts),
-            "sensor": [error.name for error in fit.sensors], "channel": list(model.measures),
-            "condition": [condition.name for condition in conditions],
-        }  # fmt: skip
-        ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in self.cycles]
-        attributes = {
-            "name": mechanism.name,
-            "identified": measurement.name,
-            **origin(mechanism, system.plan.formula),
-            "confidence": CONFIDENCE,
-            "encoder": self.encoder,
-            "parameter_paths": [unknown.paths for unknown in model.unknowns],
-            "parameter_units": [unknown.unit for unknown in model.unknowns],
-            "channel_units": [measure.unit(system) for measure in model.measures.values()],
-            "channel_measures": [measure.name for measure in model.measures.values()],
-            "drive": next(iter(mechanism.drivers), ""),
-            # angles of the first driver where the cycle begins and ends, rad; None if they name no position
-            "drive_range": [list(pair) if np.isfinite(pair).all() else None for pair in ends],
-            "files": [list(condition.files) for condition in conditions],
-            **of_data(measurement),
-            "inputs": inputs(mechanism),
-            "evaluations": fit.evaluate.cache_info().misses,
-            "converged": int(self.solution.converged),
-            "references": "\n".join([*SOURCES, *references(mechanism)]),
-            "findings": finding_rows(self.findings()),
-        }
-        variables = described({name: arrays[name] for name in VARIABLES}, VARIABLES)
-        return dataset_of("identification", variables, labels, attributes)
-
-    def findings(self) -> list[Finding]:
-        """Errors and warnings first."""
-        fit, conditions = self.fit, self.measurement.conditions
-        driver, fitted = next(iter(self.mechanism.drivers), ""), {fit.blocks[k].condition for k in fit.fitted}
-        rows = [*other_speed(driver, [(conditions[k], self.cycles[k].speed) for k in sorted(fitted)])]
-        rows += [*_of_fit(self), *_of_unknowns(self)]
-        return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))
+def _residuals(fit: Fit, x: Array, spread: Covariances, conditions: Sequence[Condition]) -> dict[str, NDArray[Any]]:
+    """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions; and those
+    of all predictions over what is expected of them, NaN if nothing is held out."""
+    channels, longest = list(fit.model.measures), max(len(condition.phase) for condition in conditions)
+    sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
+    arrays = {name: var.blank(sizes) for name, var in VARIABLES.items() if var.dims and {*var.dims} <= {*sizes}}
+    for k, condition in enumerate(conditions):
+        arrays["phase"][k, : len(condition.phase)] = condition.phase
+    allowed = fit.allowed(x)
+    for k, block in enumerate(fit.blocks):
+        at, signal, mask = (channels.index(block.channel), block.condition), block.signal, fit.masks[k]
+        mask = allowed[k] if block.held else mask
+        before, after = (np.where(mask, fit.gap(values, k), np.nan) for values in (fit.start, x))
+        # of the positions that are used: beside jumps turns scatter more
+        variance, rows = block.pooled(mask) / np.maximum(signal.count, 1), dict[str, Array]()
+        figures: dict[str, float]
+        if block.held:
+            columns = np.where(mask, np.nan_to_num(fit.reading(x, k)[1]), 0.0)
+            predicted = np.einsum("pi,pq,qi->i", columns, spread.covariance, columns)
+            expected = np.where(mask, np.sqrt(variance + predicted), np.nan)
+            figures = {"held_out_turns": len(signal.turns), "held_out_before": rms(before),
+                       "held_out_after": rms(after), "held_out_expected": rms(expected)}  # fmt: skip
+        else:
+            expected = np.where(mask & block.repeats, np.sqrt(variance + block.unresolved**2), np.nan)
+            rows = {"measured": signal.mean, "residual_before": before, "residual_after": after,
+                    "residual_uncertainty": expected}  # fmt: skip
+            figures = {"turns": len(signal.turns), "rms_before": rms(before), "rms_after": rms(after),
+                       "rms_expected": rms(expected), "used": int(np.count_nonzero(mask)),
+                       "left_out": int(np.count_nonzero(np.isfinite(signal.mean) & ~mask))}  # fmt: skip
+        for name, row in rows.items():
+            arrays[name][at][: len(row)] = row
+        for name, figure in figures.items():
+            arrays[name][at] = figure
+    arrays["hold_out_ratio"] = np.asarray(rms(arrays["held_out_after"] / arrays["held_out_expected"]))
+    return arrays
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _of_fit(identified: _Identified) -> Iterator[Finding]:
+def _of_fit(
+    fit: Fit, solution: Solution, spread: Covariances, lost: NDArray[np.bool_], refuted: bool, ratio: float
+) -> Iterator[Finding]:
     """Whether the search converged, the model fits and predicts, and turns and conditions repeat."""
-    fit, spread, solution, ratio = identified.fit, identified.spread, identified.solution, identified.hold_out_ratio
     test = spread.test
     if not (solution.converged and solution.settled):
         what, remedy = "the search did not converge", "give start values closer to the solution, or fewer parameters"
         severity = Severity.WARNING if solution.converged else Severity.ERROR
         yield Finding.weighed(severity, "search.not_ended", "search", what, remedy, evaluations=solution.evaluations)
     if test.misfit:
-        worth = "the estimates mean nothing" if identified.refuted else "the intervals are widened accordingly"
+        worth = "the estimates mean nothing" if refuted else "the intervals are widened accordingly"
         reduced = f"{float(f'{test.reduced:.3g}'):,.10g}"  # without a power of ten
         what = f"the model does not fit: reduced χ² {reduced} (1 is expected from the scatter between turns), p-value "
         what += f"{max(test.chance, 1e-4):.2g}{' or less' * (test.chance < 1e-4)}; {worth}"
         remedy = "`trunnion compare` shows what zero, gain, angle or friction would explain it; or identify more "
-        severity = Severity.ERROR if identified.refuted else Severity.WARNING
+        severity = Severity.ERROR if refuted else Severity.WARNING
         figures = {"reduced": test.reduced, "chance": test.chance}
         yield Finding.weighed(severity, "fit.misfit", "fit", what, f"{remedy}parameters", **figures)
     if ratio > POOR:
@@ -516,7 +478,7 @@ def _of_fit(identified: _Identified) -> Iterator[Finding]:
         yield Finding.warning("held_out.missed", "hold_out", what, remedy, times=ratio)
     for p, unknown in enumerate(fit.model.unknowns):
         times = float(np.sqrt(spread.apart[p]))
-        if times > 1 and not identified.lost[p]:
+        if times > 1 and not lost[p]:
             what = f"the conditions disagree: estimates from single ones vary {times:.2g} times as much as the "
             what += "scatter between turns explains; the interval is widened accordingly"
             remedy = "look for differences between conditions: settings, speed, temperature, the zero of each file"
@@ -534,10 +496,16 @@ def _of_fit(identified: _Identified) -> Iterator[Finding]:
         yield Finding.warning("fit.turns_alike", "data", what, remedy, correlation=spread.follows)
 
 
-def _of_unknowns(identified: _Identified) -> Iterator[Finding]:
+def _of_unknowns(
+    fit: Fit,
+    x: Array,
+    gross: bool,
+    figures: Mapping[str, NDArray[Any]],
+    groups: Sequence[tuple[int, ...]],
+    refuting: Mapping[int, float],
+) -> Iterator[Finding]:
     """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit;
     unknowns without an effect, that are not told apart, or that the data hardly determine."""
-    fit = identified.fit
     stated = {fit.blocks[k].channel for k in fit.fitted for accuracy in [fit.blocks[k].signal.accuracy]
               if shared_zero(accuracy) or accuracy.gain}  # fmt: skip
     channels = dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)
@@ -545,8 +513,8 @@ def _of_unknowns(identified: _Identified) -> Iterator[Finding]:
         what = f"no accuracy is stated for {', '.join(bare)}: zero and gain count as exact, and the intervals are too "
         remedy = "state accuracy: {zero: …, gain: …} in the mapping"
         yield Finding.warning("sensor.no_accuracy", "sensors", f"{what}narrow", remedy)
-    for s, sensor in enumerate(fit.sensors) if not identified.spread.test.gross else ():
-        excess, times = s in identified.refuting, abs(identified.refuting.get(s, float(identified.x[fit.count + s])))
+    for s, sensor in enumerate(fit.sensors) if not gross else ():
+        excess, times = s in refuting, abs(refuting.get(s, float(x[fit.count + s])))
         if sensor.stated and times > OFF:
             what = f"differs from its stated value by {times:.1f} standard uncertainties"
             what += ", which no stated error does: the estimates mean nothing" * excess
@@ -554,15 +522,15 @@ def _of_unknowns(identified: _Identified) -> Iterator[Finding]:
             where, severity = "angle.zero" if sensor.angle else sensor.name, (Severity.WARNING, Severity.ERROR)[excess]
             yield Finding.weighed(severity, "sensor.off", where, what, remedy, times=times, beyond=excess)
     every = [*(unknown.name for unknown in fit.model.unknowns), *(f"the {error.name}" for error in fit.sensors)]
-    for group in identified.groups:
+    for group in groups:
         names = [every[i] for i in group]
         what = "is not identifiable: it has no effect on" if len(names) == 1 else "are not separately identifiable: "
         what = f"{' and '.join(names)} {what}{'they have the same effect on' * (len(names) > 1)} {', '.join(channels)}"
         remedy = "fix one or more, or measure a quantity that tells them"
         yield Finding.warning("parameter.not_told_apart", f"parameter {names[0]}", what, remedy, names=names)
-    for p, unknown in enumerate(fit.model.unknowns) if not identified.refuted else ():
-        if identified.vague[p]:  # of a model that does not fit, that is why
-            about = with_uncertainty(float(identified.x[p]), float(identified.half[p]), unknown.unit)
+    for p, unknown in enumerate(fit.model.unknowns) if not (gross or refuting) else ():
+        if figures["vague"][p]:  # of a model that does not fit, that is why
+            about = with_uncertainty(float(x[p]), float(figures["half"][p]), unknown.unit)
             what = f"{unknown.name} is not identifiable: its 95 % interval, {about}, is wider than the value itself"
             remedy = "fix it, or measure a quantity that depends on it more"
             yield Finding.warning("parameter.vague", f"parameter {unknown.name}", what, remedy)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -300,51 +300,42 @@ class _Reader:
                 draft.note("exchange.bare_end", f"joints.{pair.name}", what, "draw its pin as a circle")
 
     def _guides(self) -> set[frozenset[str]]:
-        """Prismatic pairs where lines of two layers lie on each other; the layers that they join.
+        """Prismatic pairs where lines of two layers lie on each other, the shorter ones the slider's; these layers.
 
         A line between two joints is the body of a link, which may lie on another by chance.
         """
-        draft = self.draft
-        guided: dict[frozenset[str], dict[str, dict[Line, None]]] = {}
-        chance: set[frozenset[str]] = set()
+        draft, order = self.draft, list(self.draft.bodies)
+        guided, chance = defaultdict[frozenset[str], list[Line]](list), defaultdict[frozenset[str], list[Line]](list)
         for both in _lying(self.sketch.lines, self.gap):
             layers = frozenset(line.layer for line in both)
             bodies = [all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line])
                       for line in both]  # fmt: skip
-            if all(bodies) or any(layers <= self.marks[k].keys() for k in self.joined):
-                continue
-            if any(bodies):
-                chance.add(layers)
-                continue
-            for line in both:
-                guided.setdefault(layers, {}).setdefault(line.layer, {})[line] = None
-        for layers in sorted(chance - guided.keys(), key=sorted):
+            if not all(bodies) and not any(layers <= self.marks[k].keys() for k in self.joined):
+                (chance if any(bodies) else guided)[layers] += both
+        for layers in sorted(chance.keys() - guided.keys(), key=sorted):
             draft.lose("guides along lines between joints", " and ".join(sorted(layers)))
-        for lines in guided.values():
-            free = {layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
-                    for layer, drawn in lines.items()}  # fmt: skip
-            self._guide({layer: free[layer] or list(lines[layer]) for layer in lines})
+        for layers, pairs in guided.items():
+            lines = {layer: [line for line in dict.fromkeys(pairs) if line.layer == layer] for layer in layers}
+            for layer, drawn in lines.items():
+                lines[layer] = [line for line in drawn if not self.joined & {*self.ends[line]}] or drawn
+            length = {layer: max(line.length for line in lines[layer]) for layer in layers}
+            slider, rail = sorted(layers, key=lambda layer: (length[layer], -order.index(layer)))
+            along = lines[slider][0].span / lines[slider][0].length
+            ways = np.array([sorted(end @ along for end in (line.start, line.end)) for line in lines[slider]])
+            same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * line.length for line in lines[slider])
+            if not same or np.ptp(ways, axis=0).max() > TOUCH * self.size:
+                several = "lengths" if same else "directions"
+                what = f"has lines of several {several} on those of {rail}; no guide is read"
+                draft.warn("exchange.line", f"links.{slider}", what, "draw the slider as lines of one length")
+                continue
+            middle = self._place(np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0))
+            pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
+            longer = all(line.length - length[slider] > TOUCH * self.size for line in lines[rail])
+            pair.length = length[slider] if longer else None
+            what = f"is taken as a guide, for lines of {slider} lie on lines of {rail}"
+            remedy = "if it is none, draw the links at another position"
+            draft.note("exchange.guide", f"joints.{pair.name}", what, remedy)
         return set(guided)
-
-    def _guide(self, lines: dict[str, list[Line]]) -> None:
-        """The prismatic pair of two layers with lines that lie on each other: the shorter ones are the slider's."""
-        draft = self.draft
-        length = {layer: max(line.length for line in lines[layer]) for layer in lines}
-        order = list(draft.bodies)
-        slider, rail = sorted(lines, key=lambda layer: (length[layer], -order.index(layer)))
-        along = lines[slider][0].span / lines[slider][0].length
-        ways = np.array([sorted(end @ along for end in (line.start, line.end)) for line in lines[slider]])
-        same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * line.length for line in lines[slider])
-        if not same or np.ptp(ways, axis=0).max() > TOUCH * self.size:
-            what = f"has lines of several {'lengths' if same else 'directions'} on those of {rail}; no guide is read"
-            draft.warn("exchange.line", f"links.{slider}", what, "draw the slider as lines of one length")
-            return
-        middle = self._place(np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0))
-        pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
-        longer = all(line.length - length[slider] > TOUCH * self.size for line in lines[rail])
-        pair.length = length[slider] if longer else None
-        what = f"is taken as a guide, for lines of {slider} lie on lines of {rail}"
-        draft.note("exchange.guide", f"joints.{pair.name}", what, "if it is none, draw the links at another position")
 
     def _slots(self) -> tuple[list[Slot], set[Line]]:
         """What two half circles and two lines of a layer enclose, and these lines."""

@@ -11,9 +11,8 @@ from exchange.step_files import StepFile, box, prism, turn, turned
 STILL = (np.eye(3), np.zeros(3))
 
 
-def placed(parts, rotation=None, shift=(0, 0, 0)):
+def placed(parts, rotation, shift):
     """Parts {name: (shape, matrix, shift)} turned and shifted as a whole."""
-    rotation = np.eye(3) if rotation is None else rotation
     return {
         name: (shape, rotation @ matrix, rotation @ np.array(at, float) + np.array(shift, float))
         for name, (shape, matrix, at) in parts.items()
@@ -59,13 +58,14 @@ def slider_crank(angle=math.pi / 3, split="seam"):
     }
 
 
-def four_bar(angle=math.pi / 3, split="seam"):
+def four_bar():
     """Ground 100 mm, crank 30, coupler 90, rocker 70; four loose pins of one part."""
-    ground = bar(100, [(0, 10.04), (100, 10.04)], -10, 0, split=split)
-    crank = bar(30, [(0, 10.02), (30, 10.05)], 0, 10, 8, split)
-    coupler = bar(90, [(0, 10.03), (90, 10.03)], 10, 20, 8, split)
-    rocker = bar(70, [(0, 10.02), (70, 10.06)], 0, 10, 8, split)
-    pin = turned([(0, 0), (5, 0), (5, 20), (0, 20)], split=split)
+    ground = bar(100, [(0, 10.04), (100, 10.04)], -10, 0)
+    crank = bar(30, [(0, 10.02), (30, 10.05)], 0, 10, 8)
+    coupler = bar(90, [(0, 10.03), (90, 10.03)], 10, 20, 8)
+    rocker = bar(70, [(0, 10.02), (70, 10.06)], 0, 10, 8)
+    pin = turned([(0, 0), (5, 0), (5, 20), (0, 20)])
+    angle = math.pi / 3
     b = 30 * np.array([math.cos(angle), math.sin(angle)])
     to_d = np.array([100, 0]) - b
     far = float(np.linalg.norm(to_d))
@@ -86,25 +86,25 @@ def four_bar(angle=math.pi / 3, split="seam"):
 SHAFTS = math.pi / 6  # angle between the shafts of the Cardan joint
 
 
-def cardan(split="seam"):
+def cardan():
     """Two forks and a cross, drawn with the pin of the first fork normal to the plane of the shafts, z."""
     c, s = math.cos(SHAFTS), math.sin(SHAFTS)
     along, across = np.array([c, s]), np.array([-s, c])
     wall = [along * a + across * b for a, b in ((60, -90), (60, 40), (40, 40), (40, -60))]
     outline = [(-60, -90), *wall, (-40, -60), (-40, 40), (-60, 40)]
-    frame = prism(outline, -30, 30, split)
+    frame = prism(outline, -30, 30)
     frame.feature(5, (-40, 0, 0), [(10.02, 0), (10.02, -20)], 7)
     frame.feature(3, (*(40 * along), 0), [(10.03, 0), (10.03, -20)], 1)
 
     def fork(shaft):
         outline = [(-23, -30), (23, -30), (23, 10), (15, 10), (15, -22), (-15, -22), (-15, 10), (-23, 10)]
-        shape = prism(outline, -8, 8, split)
+        shape = prism(outline, -8, 8)
         shape.feature(1, (23, 0, 0), [(5.01, 0), (5.01, -8)], 3).feature(7, (-23, 0, 0), [(5.01, 0), (5.01, -8)], 5)
         return shape.feature(0, (0, -30, 0), shaft)
 
     held = [(14, 0), (14, 10), (10, 10), (10, 30), (14, 30), (14, 35), (0, 35)]
     plain = [(14, 0), (14, 9), (10, 9), (10, 40), (0, 40)]
-    cross = box((-9, -9, -9), (9, 9, 9), split)
+    cross = box((-9, -9, -9), (9, 9, 9))
     for face, x, y in ((0, 0, -9), (1, 9, 0), (2, 0, 9), (3, -9, 0)):
         boss(cross, face, (x, y, 0), 10, 14)
     z, x, second = np.array([0.0, 0, 1]), np.array([1.0, 0, 0]), np.array([-s, c, 0])

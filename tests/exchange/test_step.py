@@ -44,12 +44,6 @@ def model(draft, tmp_path, extra=""):
     return trunnion.read(path)
 
 
-def stated(tmp_path, text):
-    path = tmp_path / "stated.yaml"
-    path.write_text(text)
-    return trunnion.read(path)
-
-
 def codes(draft):
     return {finding.code.removeprefix("exchange.") for finding in draft.findings}
 
@@ -313,19 +307,9 @@ def numbers(*parts, spatial=False):
     return f"mass: {float(mass):.15g}, centre: [{middle}], inertia: {about}"
 
 
-def torques(draft, tmp_path, by_hand, extra=FRICTION, steps=48):
-    """Drive torques of an imported mechanism and of the one that is written by hand."""
-    results = []
-    for mechanism in (model(draft, tmp_path, extra), stated(tmp_path, by_hand + extra)):
-        result = trunnion.analyse(mechanism, steps)
-        assert (result["status"].values <= 2).all()
-        results.append(result["drive_effort"].values.ravel())
-    return results
-
-
-def test_torque_of_the_slider_crank_is_that_of_the_model_by_hand(tmp_path):
+def slider_crank_by_hand():
     shapes = {name: numbers((part[0], *STILL)) for name, part in slider_crank().items()}
-    by_hand = f"""trunnion: 1
+    return f"""trunnion: 1
 space: planar
 ground: frame
 links:
@@ -341,17 +325,10 @@ joints:
 drivers: {{O: {{speed: 600 rpm, start: 60 deg}}}}
 assembly: {{Q: [0.2, 0]}}
 """
-    path = written(tmp_path / "a.step", slider_crank())
-    shaft = joint(import_file(path), "crank", "frame").name
-    draft = import_file(path, ground="frame", drive=shaft, speed="600 rpm")
-    imported, expected = torques(draft, tmp_path, by_hand)
-    np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
-def test_torque_of_the_cardan_is_that_of_the_model_by_hand(tmp_path):
-    parts = cardan()
-    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
-    drawn = {name: numbers(part, spatial=True) for name, part in parts.items()}
+def cardan_by_hand():
+    drawn = {name: numbers(part, spatial=True) for name, part in cardan().items()}
     c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
     axes = {"A": (1, 0, 0), "B": (0, 0, 1), "C": (-s, c, 0), "D": (c, s, 0)}
     at = {"A": np.array([-0.05, 0, 0]), "B": np.zeros(3), "C": np.zeros(3), "D": np.array([0.05 * c, 0.05 * s, 0])}
@@ -360,7 +337,7 @@ def test_torque_of_the_cardan_is_that_of_the_model_by_hand(tmp_path):
         place, axis = (", ".join(f"{float(part):.15g}" for part in vector) for vector in (at[name], axes[name]))
         return f"{name}: {{at: [{place}], axis: [{axis}]}}"
 
-    by_hand = f"""trunnion: 1
+    return f"""trunnion: 1
 space: spatial
 ground: frame
 links:
@@ -375,9 +352,21 @@ joints:
   D: {{type: cylindrical, links: [output, frame], pin: {{radius: 10 mm, length: 20 mm, clearance: 30 um}}}}
 drivers: {{A: {{speed: 600 rpm}}}}
 """
-    shaft = joint(draft, "input", "frame").name
-    draft = import_file(tmp_path / "a.step", ground="frame", drive=shaft, speed="600 rpm")
-    imported, expected = torques(draft, tmp_path, by_hand, steps=24)
+
+
+@pytest.mark.parametrize(
+    ("parts", "by_hand", "shaft", "steps"),
+    [(slider_crank, slider_crank_by_hand, "crank", 48), (cardan, cardan_by_hand, "input", 24)],
+)
+def test_torque_is_that_of_the_model_by_hand(parts, by_hand, shaft, steps, tmp_path):
+    path = written(tmp_path / "a.step", parts())
+    drive = joint(import_file(path, ground="frame"), shaft, "frame").name
+    draft = import_file(path, ground="frame", drive=drive, speed="600 rpm")
+    (tmp_path / "by-hand.yaml").write_text(by_hand() + FRICTION)
+    mechanisms = model(draft, tmp_path, FRICTION), trunnion.read(tmp_path / "by-hand.yaml")
+    results = [trunnion.analyse(mechanism, steps) for mechanism in mechanisms]
+    assert all((result["status"].values <= 2).all() for result in results)
+    imported, expected = (result["drive_effort"].values for result in results)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
@@ -472,18 +461,14 @@ def test_voids_bent_bars_and_mirroring_placements(tmp_path):
     ring, tube = 20.0, 4.0
     bend = StepFile()
     ends = [(np.array([ring, 0, 0.0]), np.array([0, -1.0, 0])), (np.array([0, ring, 0.0]), np.array([-1.0, 0, 0]))]
-    starts = [centre + tube * np.array([0, 0, 1.0]) for centre, _ in ends]
-    circles = [
-        ("circle", centre, normal, tube, start, start) for (centre, normal), start in zip(ends, starts, strict=True)
-    ]
-    back = [(kind, centre, -normal, *rest) for kind, centre, normal, *rest in circles]
-    surfaces = [("PLANE", centre, normal) for centre, normal in ends]
-    faces = [
-        {"surface": surface, "sense": True, "loops": [[circle]]}
-        for surface, circle in zip(surfaces, circles, strict=True)
-    ]
+    faces, back = [], []
+    for centre, normal in ends:
+        start = centre + tube * np.array([0, 0, 1.0])
+        circle = ("circle", centre, normal, tube, start, start)
+        faces.append({"surface": ("PLANE", centre, normal), "sense": True, "loops": [[circle]]})
+        back.append([("circle", centre, -normal, tube, start, start)])
     bent = ("TOROIDAL_SURFACE", np.zeros(3), np.array([0, 0, 1.0]), ring, tube)
-    faces.append({"surface": bent, "sense": True, "loops": [[back[0]], [back[1]]]})
+    faces.append({"surface": bent, "sense": True, "loops": back})
     bend.part("bend", Shape(faces))
     body = import_file(bend.write(tmp_path / "b.step")).bodies["bend"]
     volume = math.pi * tube**2 * math.pi / 2 * ring

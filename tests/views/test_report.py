@@ -14,10 +14,10 @@ from stand_in_tolerances import CASES
 import trunnion
 from mechanisms_parts import example
 from trunnion import play, sweep
-from trunnion.views.page import bundle
+from trunnion.views.page import bundle, embedded
 from trunnion.views.play import tables as play_tables
 from trunnion.views.readings import readings
-from trunnion.views.report import embedded, report
+from trunnion.views.report import report
 from trunnion.views.tolerance import drawable
 from trunnion.views.tolerance import report as tolerance_report
 

@@ -125,10 +125,8 @@ def seat_angles(result: xr.Dataset) -> list[tuple[str, str, Array]]:
 
 # ---- tables of the report -------------------------------------------------------------------------------------------
 
-Row = dict[str, str]
 
-
-def error_rows(result: xr.Dataset) -> list[Row]:
+def error_rows(result: xr.Dataset) -> list[list[str]]:
     """Label, as built, ideal, difference and place of what errors change; none of a mechanism without errors.
 
     Of courses the largest as built and ideal, where contact is not lost; of errors the largest alone.
@@ -136,23 +134,21 @@ def error_rows(result: xr.Dataset) -> list[Row]:
     if "point_error" not in result:
         return []
     result = without_noise(result)
-    over, units, rows = abscissa(result), units_of(result), list[Row]()
+    over, units, rows = abscissa(result), units_of(result), list[list[str]]()
     lost_there = np.asarray(result["status"].values) == Status.CONTACT_LOST  # those positions are not valid
 
-    def row(label: str, built: float, ideal: float, unit: str, place: str = "") -> Row:
+    def row(label: str, built: float, ideal: float, unit: str, place: str = "") -> list[str]:
         change = f"{'+' if built > ideal else ''}{quantity(built - ideal, unit, units)}"
-        ends = {key: quantity(value, unit, units)
-                for key, value in (("built", built), ("ideal", ideal))}  # fmt: skip
-        return {"label": label, **ends, "difference": change, "place": place}
+        return [label, quantity(built, unit, units), quantity(ideal, unit, units), change, place]
 
-    def largest(label: str, unit: str, built: Array, ideal: Array | None = None) -> Row:
+    def largest(label: str, unit: str, built: Array, ideal: Array | None = None) -> list[str]:
         sizes, none = np.where(lost_there, np.nan, built), "" if ideal is None else NONE
         if not np.isfinite(sizes).any():
-            return {"label": label, "built": none, "ideal": none, "difference": NONE, "place": ""}
+            return [label, none, none, NONE, ""]
         index = int(np.nanargmax(np.abs(sizes)))
         place, value = over.say(index), float(sizes[index])
         if ideal is None:
-            return {"label": label, "built": "", "ideal": "", "difference": quantity(value, unit), "place": place}
+            return [label, "", "", quantity(value, unit), place]
         other = np.where(lost_there, np.nan, ideal)
         return row(label, value, float(np.nanmax(other)) if np.isfinite(other).any() else np.nan, unit, place)
 
@@ -173,7 +169,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
     return [*rows, row("Friction power, mean", lost, ideally, "W"), row("Efficiency of the cycle", built, free, "1")]
 
 
-def loss_rows(result: xr.Dataset) -> list[Row]:
+def loss_rows(result: xr.Dataset) -> list[list[str]]:
     """Joints that lose contact, with the positions, and the largest contact loss number."""
     over, rows = abscissa(result), []
     for joint, places in losses(result).items():
@@ -182,7 +178,7 @@ def loss_rows(result: xr.Dataset) -> list[Row]:
         rates = column(result, "contact_loss_number", joint=joint)
         any_rate = rates is not None and np.isfinite(rates).any()
         most = f"{number(float(np.nanmax(rates)), 3)}\u00a0rad/(N\u00a0s)" if rates is not None and any_rate else NONE
-        rows.append({"joint": joint, "places": f"{examples} and {more} more" if more > 0 else examples, "number": most})
+        rows.append([joint, f"{examples} and {more} more" if more > 0 else examples, most])
     return rows
 
 

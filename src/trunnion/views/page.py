@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import posixpath
 import re
 from collections.abc import Callable, Collection, Sequence
@@ -109,16 +110,14 @@ def page(
     about_data : findings about the data, to which the page leads where there is no other
     signed : with room for names and dates
     """
-    text = said(result, web_text("report.css") + web_text("page.css"))
-    text["findings"] = [row for row in text["findings"] if row not in missed]
+    findings = [row for row in attribute(result, "findings") if row not in missed]
     drawn = [[{**asdict(replace(part, pictures=())),
                "pictures": [{"alt": alt, "source": source(result, plot)} for alt, plot in part.pictures]}
               for part in some] for some in (parts, end)]  # fmt: skip
-    return template("page.html.j2").render(
-        kicker=kicker, name=name or str(result.attrs.get("name", "")) or "Mechanism",
-        formula=str(result.attrs.get("formula", "")), facts=facts, summary=summary, missed=missed,
-        sections=drawn[0], end=drawn[1], inputs=inputs_of(result) if "inputs" in result.attrs else [],
-        about_data=about_data, signed=signed, **text,
+    return rendered(
+        "page.html.j2", result, web_text("report.css") + web_text("page.css"), findings, kicker=kicker, name=name,
+        facts=facts, summary=summary, missed=missed, sections=drawn[0], end=drawn[1], about_data=about_data,
+        signed=signed,
     )  # fmt: skip
 
 
@@ -155,20 +154,37 @@ def with_code(text: str) -> str:
     return CODE.sub(r"<code>\1</code>", escape(str(text)))
 
 
-def said(result: xr.Dataset, style: str, findings: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
-    """What every report says: findings, notes apart from them, and where the result comes from; with its style."""
-    from markupsafe import Markup
+def rendered(
+    page: str, result: xr.Dataset, style: str, findings: Sequence[dict[str, str]] = (), name: str = "", **parts: Any
+) -> str:
+    """A page of `views/web` with what every report has: findings, notes apart from them, input data, where it is from.
 
-    rows = attribute(result, "findings") if findings is None else findings
-    return {
-        "findings": [row for row in rows if row["severity"] != "note"],
-        "notes": [row for row in rows if row["severity"] == "note"],
+    parts: what else the page shows; scene: what moves on it.
+    """
+    from markupsafe import Markup  # with jinja2 only needed here, and slow to import
+
+    if "scene" in parts:
+        script = bundle("report.js")
+        parts |= {"scene": Markup(embedded(parts["scene"])), "script": Markup(script), "script_hash": hashed(script)}
+    nothing: dict[str, Any] = {"summary": (), "missed": (), "sections": (), "end": (), "about_data": 0, "signed": False}
+    return template(page).render(nothing | parts | {
+        "name": name or str(result.attrs.get("name", "")) or "Mechanism",
+        "formula": str(result.attrs.get("formula", "")),
+        "findings": [row for row in findings if row["severity"] != "note"],
+        "notes": [row for row in findings if row["severity"] == "note"],
+        "inputs": inputs_of(result) if "inputs" in result.attrs else [],
         "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""),
-        "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style),
-        "style_hash": hashed(style),
-    }
+        "version": result.attrs.get("trunnion_version", ""), "model_hash": result.attrs.get("model_hash", ""),
+        "style": Markup(style), "style_hash": hashed(style),
+    })  # fmt: skip
+
+
+def embedded(data: Any) -> str:
+    """JSON that may stand inside a script element: no text in it can close the element or open a comment."""
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return text
 
 
 def hashed(text: str) -> str:

@@ -7,7 +7,6 @@ their hashes and forbids everything else, so no name in a model can become code 
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +27,7 @@ from trunnion.results.tables import kind_of
 from trunnion.views.as_built import error_rows, loss_rows
 from trunnion.views.axis import Abscissa, abscissa, column, intervals, members, names, series
 from trunnion.views.motion import OF_IMPACTS, Shown, drivers_of, energies, figure, pins, shown
-from trunnion.views.page import NONE, bundle, hashed, headline, inputs_of, said, source, template, web_text
+from trunnion.views.page import NONE, counts, headline, rendered, source, web_text
 from trunnion.views.scene import scene
 
 if TYPE_CHECKING:
@@ -59,76 +58,70 @@ HELD = ("kinetic_energy", "potential_energy", "contact_energy")
 def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
     """The whole report as HTML; `ideal` is the same run without friction, of a cycle, overlaid where given."""
     if kind_of(result) != "motion":
-        return _page(result, scene(result, ideal), compared=ideal is not None)
+        drawn = scene(result, ideal)
+        ((count, noun),) = counts((result.sizes["position"], "position"))
+        if drawn["thinned"] is not None:  # "3rd" if every third position is shown
+            stride = -(-drawn["thinned"] // drawn["count"])
+            ending = "th" if 10 <= stride % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(stride % 10, "th")
+            noun += f", every {stride}{ending} shown"
+        return _page(result, drawn, [(count, noun)], compared=ideal is not None)
     if ideal is not None:
         raise TypeError("report() of a motion has no argument 'ideal'")
     motion = shown(result)
     events, rows, residual = motion.events[:MOST_EVENTS], motion.rows, motion.rows["energy_residual"].values
-    account: dict[str, list[tuple[str, str]]] = {"works": [], "held": []}  # what came in and went out, what is left
-    turned, quality = 0.0, list[dict[str, str]]()
+    account: tuple[list[tuple[str, str]], ...] = [], []  # what came in and went out, what is left
+    turned, quality = 0.0, list[list[str]]()
     for name, text, course in energies(rows):
         title = f"change of the {text}" if name in HELD else text
         value = quantity(float(course[-1]) * (-1 if name in LOST else 1), "J")
-        account["held" if name in HELD else "works"].append((title[:1].upper() + title[1:], value))
+        account[name in HELD].append((title[:1].upper() + title[1:], value))
         turned = max(turned, float(np.nanmax(np.abs(course))))
     if turned > 0:
-        account["rest"] = [("Difference", quantity(float(residual[-1]), "J"))]
+        account = *account, [("Difference", quantity(float(residual[-1]), "J"))]
         worst = int(np.abs(np.nan_to_num(residual)).argmax())
-        quality.append({"label": "Energy account", "value": quantity(abs(float(residual[worst])) / turned, "1"),
-                        "place": _stated(float(rows["time"].values[worst])), "meaning": ENERGY})  # fmt: skip
-    pictures = []
-    if "contact" in result.dims and pins(result):
-        alt = "The ways of the pins in their holes, with the forces on the walls"
-        pictures.append({"alt": alt, "source": source(result, figure(result, "orbit"))})
+        quality.append(["Energy account", quantity(abs(float(residual[worst])) / turned, "1"),
+                        _stated(float(rows["time"].values[worst])), ENERGY])  # fmt: skip
+    in_play = "contact" in result.dims and pins(result)
     about = {
         "length": _stated(motion.end),
-        "asked": _stated(motion.asked) if motion.early else "",
         "events": [{"seconds": f"{event.time:.9g}", "time": quantity(event.time, "s"), "cells": event[1:]}
                    for event in events],
         "more": len(motion.events) - len(events),
-        "account": account if turned > 0 else {},
-        "pictures": pictures,
+        "account": account if turned > 0 else (),
+        "orbits": source(result, figure(result, "orbit")) if in_play else "",
     }  # fmt: skip
-    return _page(rows, motion_scene(motion), about, quality)
+    drawn = motion_scene(motion)
+    ((steps, noun),) = counts((rows.sizes["position"] - 1, "step"))
+    if drawn["thinned"] is not None:
+        noun += f", {drawn['count']} rows shown with every peak of the reactions"
+    early = f"of {_stated(motion.asked)}, then the motion ends" if motion.early else ""
+    return _page(rows, drawn, [(_stated(motion.end), early), (steps, noun)], about, quality)
 
 
 def _page(
-    result: xr.Dataset, drawn: dict[str, Any], motion: dict[str, Any] | None = None,
-    quality: Sequence[dict[str, str]] = (), compared: bool = False,
+    result: xr.Dataset, drawn: dict[str, Any], facts: list[tuple[str, str]], motion: dict[str, Any] | None = None,
+    quality: Sequence[list[str]] = (), compared: bool = False,
 ) -> str:  # fmt: skip
     """The report of a result whose scene is `drawn`; motion: what it says of one in time, quality: rows beside."""
-    from markupsafe import Markup  # with jinja2 only needed here, and slow to import
-
-    style, script = web_text("report.css"), bundle("report.js")
-    runs, thinned, holding = intervals(result), "", attribute(result, "locking_ranges", "{}")
+    unanswered = sum(run.stop - run.start for run in intervals(result))
+    holding = attribute(result, "locking_ranges", "{}")
     if holding:  # the ranges of the states of locking as a table and a strip
         rows = holding["rows"]
         holding |= {"head": HEAD, "centred": "seat_offset" in result, "strip": [row for row in rows if row["state"]],
                     "more": max(0, len(rows) - MOST_RANGES), "rows": rows[:MOST_RANGES]}  # fmt: skip
-    if drawn["thinned"] is not None:  # "3rd" if every third position is shown
-        stride = -(-drawn["thinned"] // drawn["count"])
-        thinned = f"{stride}{'th' if 10 <= stride % 100 <= 20 else {1: 'st', 2: 'nd', 3: 'rd'}.get(stride % 10, 'th')}"
-    context = {
-        "name": drawn["name"] or "Mechanism", "formula": drawn["formula"], "compared": compared,
-        "motion": motion, "closed": drawn["abscissa"]["closed"], "spatial": drawn.get("space") == "spatial",
-        "positions": result.sizes["position"], "thinned": thinned,
-        "drawn": drawn["count"], "method": result.attrs.get("method", ""),
-        "unanswered": sum(run.stop - run.start for run in runs), "summary": headline(result),
-        "holding": holding, "errors": error_rows(result), "losses": loss_rows(result),
-        "seats": bool(drawn["built"] and drawn["built"]["seats"]),
-        "balance": [*quality, *_balance(result)], "inputs": inputs_of(result),
-        **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
-        "scene": Markup(embedded(drawn)),
-    }  # fmt: skip
-    return template("report.html.j2").render(context)
-
-
-def embedded(data: Any) -> str:
-    """JSON that may stand inside a script element: no text in it can close the element or open a comment."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    for sign in "<>&\u2028\u2029":
-        text = text.replace(sign, f"\\u{ord(sign):04x}")
-    return text
+    facts = [*facts, *([(str(unanswered), "not solved")] if unanswered else [])]
+    if method := result.attrs.get("method", ""):
+        facts.append(("", f"friction by {method}"))
+    if motion is None:
+        facts.append(("", f"{'with' if compared else 'no'} comparison without friction"))
+    kicker = "Motion in time: speed, forces and energy" if motion else "Motion, reactions, friction and power"
+    return rendered(
+        "report.html.j2", result, web_text("report.css"), _findings(result), scene=drawn,
+        kicker=f"{kicker} of a linkage", facts=facts, summary=headline(result), motion=motion, compared=compared,
+        closed=drawn["abscissa"]["closed"], spatial=drawn.get("space") == "spatial", holding=holding,
+        errors=error_rows(result), seats=bool(drawn["built"] and drawn["built"]["seats"]), losses=loss_rows(result),
+        balance=[*quality, *_balance(result)],
+    )  # fmt: skip
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
@@ -142,7 +135,7 @@ def _findings(result: xr.Dataset) -> list[dict[str, str]]:
     return rows
 
 
-def _balance(result: xr.Dataset) -> list[dict[str, str]]:
+def _balance(result: xr.Dataset) -> list[list[str]]:
     """The worst figure of each check over the run, and where it stands."""
     over, rows = abscissa(result), []
     residual, error = column(result, "power_residual"), column(result, "efficiency_error")
@@ -151,22 +144,21 @@ def _balance(result: xr.Dataset) -> list[dict[str, str]]:
         most = float(drive[np.isfinite(drive)].max(initial=0.0))
         rows.append(_worst("Power balance residual", residual / (most or 1.0), "1" if most else "W", POWERS, over))
     if error is not None and np.isfinite(error):
-        rows.append({"label": "Error of the efficiency", "value": quantity(float(error), "1"), "place": "",
-                     "meaning": INTEGRALS})  # fmt: skip
+        rows.append(["Error of the efficiency", quantity(float(error), "1"), "", INTEGRALS])
     rows += [_worst(label, values, unit, meaning, over) for name, label, unit, meaning in BALANCE
              if (values := column(result, name)) is not None]  # fmt: skip
     return rows
 
 
-def _worst(label: str, values: Any, unit: str, meaning: str, over: Abscissa) -> dict[str, str]:
+def _worst(label: str, values: Any, unit: str, meaning: str, over: Abscissa) -> list[str]:
     sizes = np.where(np.isfinite(values), np.abs(values), -1.0)
     index = int(sizes.argmax()) if sizes.size else 0
     if not sizes.size or sizes[index] < 0:
-        return {"label": label, "value": NONE, "place": "", "meaning": meaning}
+        return [label, NONE, "", meaning]
     worst = float(sizes[index])
     text = quantity(worst, unit) if unit != "m" else f"{number(worst, 3)}\u00a0m"
     same = sizes.size > 1 and bool((sizes == worst).all())
-    return {"label": label, "value": text, "place": "everywhere" if same else over.say(index), "meaning": meaning}
+    return [label, text, "everywhere" if same else over.say(index), meaning]
 
 
 # ---- a motion in time -----------------------------------------------------------------------------------------------
@@ -266,17 +258,9 @@ def animation(result: xr.Dataset, ideal: xr.Dataset | None = None, height: int =
     ideal: the same run without friction, whose reactions are drawn beside; height: of the frame, px. Raises ValueError
     if `ideal` has other positions, MechanismError of a result of another kind.
     """
-    from markupsafe import Markup
-
     if kind_of(result) != "cycle":
         raise MechanismError(Finding(f"there is no animation of a {kind_of(result)}", "kind", "analyse a cycle"))
     check_whole(result, "an animation")
 
-    drawn = scene(result, ideal)
-    style, script = web_text("report.css"), bundle("report.js")
-    context = {
-        "name": drawn["name"] or "Mechanism", "version": result.attrs.get("trunnion_version", ""),
-        "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
-        "scene": Markup(embedded(drawn)),
-    }  # fmt: skip
-    return Animation(template("animation.html.j2").render(context), height)
+    drawn, kicker = scene(result, ideal), "Moving mechanism"
+    return Animation(rendered("animation.html.j2", result, web_text("report.css"), scene=drawn, kicker=kicker), height)

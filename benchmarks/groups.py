@@ -109,10 +109,10 @@ def _deviation(run: Run, n: int = 360) -> float:
         worst = max(worst, float(np.max(np.abs(ours - theirs))) / peak)
 
     reactions, frictions = other["reaction"], other["friction"]
-    for k, (name, (kind, _)) in enumerate(run.system.joints.items()):
-        same = [j for j, (other_kind, _) in enumerate(run.system.joints.values()) if other_kind == kind]
+    for k, (name, joint) in enumerate(run.system.joints.items()):
+        same = [j for j, other in enumerate(run.system.joints.values()) if other.type == joint.type]
         compare(back.friction[name], frictions[:, k], float(np.max(np.abs(frictions[:, same]))))
-        if kind == "revolute":
+        if joint.type == "revolute":
             for axis in (0, 1):
                 compare(back.reactions[name][axis], reactions[:, k, axis], float(np.max(np.abs(reactions[:, same]))))
     for k, effort in enumerate(back.efforts.values()):

@@ -69,13 +69,13 @@ def given(run: Run, time: Array) -> Given:
             loads[k] += rows(*force, arm[0] * force[1] - arm[1] * force[0])
         loads[k, 2] += values.get(f"loads.{name}.moment", 0.0)
     joints = run.system.joints
-    ends = {name: (walk.element(a, name), walk.element(b, name)) for name, (_, (a, b)) in joints.items()}
-    pins = {name: kind == "revolute" for name, (kind, _) in joints.items()}
+    ends = {name: [walk.element(link, name) for link in joint.links] for name, joint in joints.items()}
+    pins = {name: joint.type == "revolute" for name, joint in joints.items()}
     return Given(
         np.array([rows(*centre.place) for centre in centres]),
         np.array([rows(*centre.acceleration) for centre in centres]),
         np.array([rows(walk.motions[link].acceleration.w)[0] for link in links]),
-        [(number[first], number[second]) for _, (first, second) in joints.values()],
+        [tuple(number[link] for link in joint.links) for joint in joints.values()],
         np.array([rows(end.x, end.y) for _, end in ends.values()]),
         np.array([rows(end.c, end.s) for end, _ in ends.values()]),
         rows(*(np.where(back.resting[name], 0.0, np.sign(back.walk.speed(name))) for name in joints)),

@@ -54,8 +54,8 @@ def measures_of(run: Run) -> list[str]:
     turning = ("revolute", "cylindrical", "helical")
     sliding = ("prismatic", "cylindrical", "helical")
     found = [f"{link}.{point}.{axis}" for link, point in run.system.points for axis in "xyz"[:axes]]
-    found += [f"rotation:{name}" for name, (kind, _) in run.system.joints.items() if kind in turning]
-    found += [f"slide:{name}" for name, (kind, _) in run.system.joints.items() if kind in sliding]
+    found += [f"rotation:{name}" for name, joint in run.system.joints.items() if joint.type in turning]
+    found += [f"slide:{name}" for name, joint in run.system.joints.items() if joint.type in sliding]
     ends = ("",) if axes == 2 else (".x", ".y", ".z")
     spinning = {link for module in run.system.plan.modules for link, _, _ in module.spinning}
     return found + [f"angle:{link}{end}" for link in mechanism.effective_links if link not in spinning for end in ends]
@@ -106,8 +106,8 @@ def rssr(clearance: float = 2e-5, float_: float = 0.0, hole_on: str = "rocker") 
 def plays(system: System, values: Values) -> dict[str, Play]:
     """The play of every joint that states some, by joint; where it is less than none, the fit presses: none."""
     space, found = system.mechanism.space, {}
-    for name, (kind, _) in system.joints.items():
-        one = shifts.play_of(space, kind, values, name)
+    for name, joint in system.joints.items():
+        one = shifts.play_of(space, joint.type, values, name)
         if one is not None:
             found[name] = one._replace(radii=tuple(np.where(radius > 0, radius, 0.0) for radius in one.radii))
     return found
@@ -134,7 +134,7 @@ def unit_loads(measure: Measure, walk: Forward) -> dict[str, Any]:
         return {link: walk.algebra.about(along, none, walk.point(link, point).place)}
     if measure.kind == "angle":
         return {measure.subject: Screw(none, along) if space else Wrench(0.0, 0.0, 1.0)}
-    links, ends = walk.system.joints[measure.subject][1], walk.ends(measure.subject)
+    links, ends = walk.system.joints[measure.subject].links, walk.ends(measure.subject)
     axis: Any = ends[1].z if space else (ends[0].c, ends[0].s)
     load: Any = Screw(none, axis) if space else Wrench(0.0, 0.0, 1.0)
     if measure.kind == "slide":

@@ -229,7 +229,7 @@ _SOLVE = (
     Fault(
         "spin-friction-sign",
         "solve/space/determinacy.py",
-        "sign = 1.0 if walk.system.joints[name][1][1] in members else -1.0",
+        "sign = 1.0 if walk.system.joints[name].links[1] in members else -1.0",
         "sign = 1.0",
         ("tests/reference/test_space_friction.py", "-k", "drags"),
     ),

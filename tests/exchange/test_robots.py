@@ -34,7 +34,7 @@ def bare(name: str) -> Mechanism:
     drivers = {
         name: {"speed": rates[name], "start": float(start["joint_rotation"].sel(joint=name).values[0])}
         for name, driver in mechanism.drivers.items()
-        if PAIRS[mechanism.effective_joints[name].type].turns
+        if mechanism.effective_joints[name].pair.turns
     }
     return mechanism.model_copy(update={"drivers": {**mechanism.drivers, **drivers}})
 

@@ -73,7 +73,7 @@ def test_every_listed_way_is_what_its_name_gives(name):
             run = prepare(put_together(mechanism, choice, way))
             walk = run.solve(np.array([choice.time])).walk
             for joint, place in way.joints.items():
-                first, second = run.system.joints[joint][1]
+                first, second = run.system.joints[joint].links
                 one, two = walk.element(first, joint), walk.element(second, joint)
                 slide = [one.c * (two.x - one.x) + one.s * (two.y - one.y)]
                 found = [one.x, one.y] if len(place) == 2 else slide
@@ -196,7 +196,7 @@ def test_a_hint_holds_where_its_driver_is(name, share):
     for way in choice.ways:
         run = prepare(Mechanism(**{**data, "assembly": {choice.link: way.name}}))
         time = np.array([share * run.cycle.duration])
-        place = run.solve(time).walk.point(run.system.joints[joint][1][1], joint).place
+        place = run.solve(time).walk.point(run.system.joints[joint].links[1], joint).place
         stated = [float(np.ravel(part)[0]) for part in place]
         at = float(np.ravel(run.system.drive(run.values, driver, time)[0])[0])
         hinted = prepare(Mechanism(**{**data, "assembly": {joint: stated, "at": at}}))

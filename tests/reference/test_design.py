@@ -61,7 +61,8 @@ def test_shaking_force_is_what_the_joints_pass_to_the_frame(name):
     back = run.solve(run.cycle.times(24))
     x, y, turn = np.zeros(24), np.zeros(24), np.zeros(24)
     ground = mechanism.fixed_link
-    for joint, (_, (first, second)) in run.system.joints.items():
+    for joint, entry in run.system.joints.items():
+        first, second = entry.links
         if ground not in (first, second):
             continue
         sign = -1.0 if first == ground else 1.0  # the reaction is on the second link, by the first
@@ -166,9 +167,9 @@ def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name, loaded):
     run, walk, found = angles(mechanism)
     b, c, d = module.joints
     # the force acts on the driven link in C, but by a slide through the outer pin of the two-force link
-    acts_at, holder_at = (c if run.system.joints[c][0] == "revolute" else (b, d)[1 - loaded]), (b, d)[loaded]
-    holder = next(link for link in run.system.joints[holder_at][1] if link != driven)
-    place = walk.element(run.system.joints[acts_at][1][0], acts_at)
+    acts_at, holder_at = (c if run.system.joints[c].type == "revolute" else (b, d)[1 - loaded]), (b, d)[loaded]
+    holder = next(link for link in run.system.joints[holder_at].links if link != driven)
+    place = walk.element(run.system.joints[acts_at].links[0], acts_at)
     reaction = run.solve(run.cycle.times(24)).reactions[c]
 
     def velocity(link):

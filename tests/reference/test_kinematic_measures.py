@@ -139,7 +139,7 @@ def test_speeds_in_space_by_differences(spatial):
         rate, second = course(spatial, f"rate:{joint}", time), course(spatial, f"joint_acceleration:{joint}", time)
         np.testing.assert_allclose(rate, slope(spatial, f"rotation:{joint}", time), rtol=1e-6)
         np.testing.assert_allclose(second, slope(spatial, f"rate:{joint}", time), rtol=1e-6, atol=1e-5)
-        moving = next(link for link in spatial.system.joints[joint][1] if link != mechanism.fixed_link)
+        moving = next(link for link in spatial.system.joints[joint].links if link != mechanism.fixed_link)
         np.testing.assert_allclose(course(spatial, f"angular_velocity:{moving}", time), np.abs(rate), rtol=1e-12)
         size = course(spatial, f"angular_acceleration:{moving}", time)
         np.testing.assert_allclose(size, np.abs(second), rtol=1e-9, atol=1e-9)

@@ -105,7 +105,7 @@ def independent_shares(run, data, guide):
         rubbing = [other.rubbing(motions, name) for name in run.system.joints]
         felt.append(loads_of_bearings(other.bodies(motions), other.joints_at(motions, {}), rubbing, other.gravity))
     start, slope = (np.array(parts) for parts in zip(*felt, strict=True))
-    slides = np.array([kind == "prismatic" for kind, _ in run.system.joints.values()])
+    slides = np.array([joint.type == "prismatic" for joint in run.system.joints.values()])
     coefficients = np.array([other.coefficient(name) for name in run.system.joints])
 
     def residual(sizes, share):

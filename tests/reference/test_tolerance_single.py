@@ -57,8 +57,8 @@ def measures_of(run):
     """Of every kind, as far as the mechanism has it."""
     mechanism = run.system.mechanism
     joints, driver = run.system.joints, next(iter(mechanism.drivers))
-    turning = [name for name, (kind, _) in joints.items() if kind == "revolute" and name not in mechanism.drivers]
-    sliding = [name for name, (kind, _) in joints.items() if kind in ("prismatic", "cylindrical")]
+    turning = [name for name, joint in joints.items() if joint.type == "revolute" and name not in mechanism.drivers]
+    sliding = [name for name, joint in joints.items() if joint.type in ("prismatic", "cylindrical")]
     link, point = [one for one in run.system.points if one[0] != mechanism.fixed_link][-1]
     found = [f"{statistic}:effort:{driver}" for statistic in ("maximum", "minimum", "rms", "mean", "largest")]
     found += ["efficiency:cycle"] * has_useful_work(mechanism)

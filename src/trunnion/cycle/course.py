@@ -23,7 +23,6 @@ from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Status
-from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import Figure
 from trunnion.solve.backward import Backward, status_of
 from trunnion.solve.contacts import bearing_ends
@@ -289,7 +288,7 @@ def magnitude(rows: Array) -> Array:
 def followed(system: System, errs: bool) -> tuple[str, ...]:
     """The variables that the summary of a cycle is made of."""
     in_space = ("reaction_moment",) * (system.mechanism.space == "spatial")
-    slides = ("joint_slide",) * any(PAIRS[kind].guided for kind, _ in system.joints.values())
+    slides = ("joint_slide",) * any(joint.pair.guided for joint in system.joints.values())
     ends = ("end_load",) * any(bearing_ends(system.mechanism, joint) for joint in system.joints)
     return (*FOLLOWED, *in_space, *slides, *ends, *(COMPARED_ROWS if errs else ()))
 

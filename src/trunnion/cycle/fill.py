@@ -17,7 +17,6 @@ from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.errors import Status
 from trunnion.groups.dyad import DyadPose
 from trunnion.joints.clearance import describing
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward, status_of
@@ -147,7 +146,7 @@ def _joint_in_space(walk: SpatialWalk, i: int, joint: str) -> Iterator[Cell]:
                 for suffix, value in zip(DERIVATIVES, values, strict=True):
                     yield name + suffix, (i,), value
         return
-    (first, second), (first_end, two) = walk.system.joints[joint][1], walk.ends(joint)
+    (first, second), (first_end, two) = walk.system.joints[joint].links, walk.ends(joint)
     turn = scaled(0.5, plus(plus(cross(first_end.x, two.x), cross(first_end.y, two.y)), cross(first_end.z, two.z)))
     cosine = 0.5 * (dot(first_end.x, two.x) + dot(first_end.y, two.y) + dot(first_end.z, two.z) - 1)
     spin = walk.against(joint).u
@@ -312,7 +311,7 @@ def _direction(walk: Forward, i: int, seat: GivenSeat, ends: Mapping[int, Vector
     yield "seat_beta", (i,), beta
     yield "seat_xi", (i,), xi
     if walk.system.turns(seat.joint):
-        first_frame, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
+        first_frame, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint].links)
         yield "seat_xi_pin", (i,), wrapped(xi + walk.coordinate(seat.joint, first_frame, two))
 
 
@@ -326,7 +325,7 @@ def fill_errors(arrays: Arrays, ideal: Arrays, system: System, window: slice) ->
     differences: dict[str, Array] = {}
     if system.mechanism.space == "planar":
         links, turned = labels(system)["link"], wrapped(arrays["link_angle"][:, window] - ideal["link_angle"])
-        pairs = [[links.index(link) for link in ends] for _, ends in system.joints.values()]
+        pairs = [[links.index(link) for link in joint.links] for joint in system.joints.values()]
         differences["link_error"] = turned
         differences["joint_rotation_error"] = np.array([turned[second] - turned[first] for first, second in pairs])
     else:
@@ -525,14 +524,14 @@ def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.floa
     for link, i in places.items():
         if not spatial and link != system.mechanism.fixed_link:
             unwrap_row(arrays["link_angle"][i], arrays["link_angle_velocity"][i], step)
-    for i, (name, (kind, (first, second))) in enumerate(system.joints.items()):
-        rotation = arrays["joint_rotation"][i]
+    for i, (name, joint) in enumerate(system.joints.items()):
+        rotation, (first, second) = arrays["joint_rotation"][i], joint.links
         if not spatial:
             np.subtract(arrays["link_angle"][places[second]], arrays["link_angle"][places[first]], out=rotation)
         if name in system.mechanism.drivers:  # known where the rest is not
             arrays["joint_rotation" if system.turns(name) else "joint_slide"][i] = system.drive(values, name, time)[0]
-        elif spatial and PAIRS[kind].angle:
+        elif spatial and joint.pair.angle:
             unwrap_row(rotation, arrays["joint_rotation_velocity"][i], step)
-        if PAIRS[kind].threaded:  # its slide follows the whole turns
+        if joint.pair.threaded:  # its slide follows the whole turns
             pitch = float(np.ravel(values[f"joints.{name}.pitch"])[0])
             arrays["joint_slide"][i] = rotation * pitch / (2 * np.pi)

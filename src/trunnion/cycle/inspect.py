@@ -80,8 +80,8 @@ def _rank(walk: Forward) -> int | None:
     """Mobility by rank at the first assembled position."""
     system = walk.system
     places = {
-        name: np.stack(np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(second, name))))
-        for name, (_, (_, second)) in system.joints.items()
+        name: np.stack(np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(joint.links[1], name))))
+        for name, joint in system.joints.items()
     }
     length = max((place.shape[1] for place in places.values()), default=1)
     places = {name: np.broadcast_to(place, (len(place), length)) for name, place in places.items()}
@@ -94,7 +94,8 @@ def _rank(walk: Forward) -> int | None:
         for name in system.mechanism.gears
     }
     links = [link for module in system.plan.modules for link in module.links]
+    joints = {name: (joint.type, joint.links) for name, joint in system.joints.items()}
     try:
-        return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, system.plan.modules)
+        return mobility_by_rank(links, system.mechanism.fixed_link, joints, at, gears, system.plan.modules)
     except np.linalg.LinAlgError:  # of numbers near the end of the floats
         return None

@@ -15,7 +15,6 @@ from trunnion.cycle.course import CycleCourse, Means, course_of, unknown
 from trunnion.cycle.cycle_kernel import compiles, kernel_of
 from trunnion.cycle.fill import COMPARED, Arrays, Causes, allocate, fill_chunk, fill_errors, labels, unwrap
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
@@ -81,7 +80,7 @@ def needed(names_asked: Collection[str], system: System, erring: bool) -> set[st
         parts = {name for name, entry in results.VARIABLES.items() if entry.part}
         variables |= {*parts, *COMPARED}
     variables |= {results.SAME_AS[name] for name in variables & results.SAME_AS.keys()}
-    if any(PAIRS[kind].threaded for kind, _ in system.joints.values()):  # a screw's slide follows its rotation
+    if any(joint.pair.threaded for joint in system.joints.values()):  # a screw's slide follows its rotation
         variables.add("joint_rotation")
     return variables | {other for name in variables & TURNED.keys() for other in TURNED[name]}
 

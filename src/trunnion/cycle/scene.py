@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import Frame
-from trunnion.joints.pairs import PAIRS
 from trunnion.solve.loads import Stated, stated_walk, useful_loads
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import hole, play_of
@@ -30,15 +29,15 @@ def scene_of(run: Run) -> dict[str, Any]:
         points[link].append(point)
     joints: dict[str, dict[str, Any]] = {}
     plays = {name: play for name in mechanism.seated if (play := _play(system, values, name)) is not None}
-    for name, (kind, links) in system.joints.items():
-        joints[name] = {"type": kind, "links": list(links), "friction": name in rubbed}
+    for name, joint in system.joints.items():
+        joints[name] = {"type": joint.type, "links": list(joint.links), "friction": name in rubbed}
         if spatial:
-            frames: list[Any] = [elements[link, name] for link in links]
+            frames: list[Any] = [elements[link, name] for link in joint.links]
             joints[name]["frames"] = [_plain(frame) for frame in frames]
             if name in plays:
                 plays[name]["hole"] = _plain(hole(frames[1], values, name))
-        elif "planar" in PAIRS[kind].needs_axis:
-            axis = elements[links[0], name]
+        elif "planar" in joint.pair.needs_axis:
+            axis = elements[joint.links[0], name]
             joints[name]["axis"] = [float(axis.c), float(axis.s)]
     teeth = [name for name, gear in mechanism.gears.items() if gear.touches and not spatial]
     # what each measure of the model is of, in words: "slide of S", "effort of A"
@@ -71,7 +70,7 @@ def _plain(frame: Frame) -> list[list[float]]:
 
 def _play(system: System, values: Values, name: str) -> dict[str, Any] | None:
     """The play of a joint with a seat, m: what has it, to either side, along the axis, length H, pin's radius."""
-    play = play_of(system.mechanism.space, system.joints[name][0], values, name)
+    play = play_of(system.mechanism.space, system.joints[name].type, values, name)
     if play is None:
         return None
     axial = play.model.axial
@@ -95,7 +94,7 @@ def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, A
     """Pitch circles of a gear pair with teeth, or of the wheel of a rack, chain or rope: their centres and radii, m."""
     gear, joints = system.mechanism.gears[name], system.mechanism.coupled(name)
     carriers = system.mechanism.carriers(name) or (0, 0)
-    links = [system.joints[joint][1] for joint in joints]
+    links = [system.joints[joint].links for joint in joints]
     if gear.slides:
         carried = links[0][1 - carriers[0]]
         return [{"at": f"{carried}.{joints[0]}", "radius": abs(float(system.ratio(values, name)))}]

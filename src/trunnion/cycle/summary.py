@@ -20,7 +20,6 @@ from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.scene import load_courses, scene_of
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import ANY
 from trunnion.results import variables as results
@@ -139,7 +138,7 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     if system.mechanism.space == "spatial":
         loads.append(("reaction moment", "reaction_moment", "N m"))
     planar = system.mechanism.space == "planar"
-    for i, (name, (kind, _)) in enumerate(system.joints.items()):
+    for i, (name, joint) in enumerate(system.joints.items()):
         for what, variable, unit in loads:
             top = course.extreme(variable, i, of=magnitude, unit=unit)
             if top is None:
@@ -148,7 +147,7 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
                 key = f"{name}.{what.replace(' ', '_')}_max"
                 yield course.figure(key, f"{what} of {name}", top, unit, "maximum")
         yield from _bearing(cycle, course, i, name)
-        if PAIRS[kind].guided:
+        if joint.pair.guided:
             valid = course.valid
             ends = [course.extreme("joint_slide", i, sign=sign, panels=valid, unit="m") for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
@@ -232,10 +231,10 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         top, k = next(pair for pair in points if pair[0].value >= highest)  # of equal ones the first
         most = f"largest: {'.'.join(run.system.points[k])}"
         yield course.figure("point_error_max", "position error", top, "m", most)
-    for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
-        if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
+    for i, (joint, entry) in enumerate(run.system.joints.items()):
+        if run.system.mechanism.fixed_link not in entry.links or joint in run.system.mechanism.drivers:
             continue
-        what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
+        what, unit = ("slide", "m") if entry.pair.guided else ("rotation", "rad")
         if (error := largest(f"joint_{what}_error", i, unit)) is not None:
             name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
             yield course.figure(name, subject, error, unit, "largest magnitude")

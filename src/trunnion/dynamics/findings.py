@@ -17,7 +17,6 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError, Status, agreeing, counted
 from trunnion.joints.contact import restitution_of
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.solve.run import Run
@@ -128,7 +127,7 @@ def _refused(mechanism: Mechanism) -> Iterator[Finding]:
         elif rough:
             what = f"it may hold joint {joint} beside friction between rigid bodies in {rough}; how they share is not "
             what += "solved"
-        elif PAIRS[joints[joint].type].count != 1:
+        elif joints[joint].pair.count != 1:
             what = f"it may hold joint {joint}, which has more than one freedom, and {len(free)} coordinates are free"
         if what:
             yield Finding(what, where, f"leave it out, or use a law that is smooth at rest: {', '.join(SMOOTH)}")
@@ -339,7 +338,7 @@ def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[F
             where, remedy = f"joints.{contact.joint}.contact", "check the stiffness of the contact"
             yield Finding.warning("simulate.soft", where, what, remedy, depth=depth, clearance=contact.clearance)
     for contact in {contact.joint: contact for contact in motion.contacts}.values():
-        law = run.system.mechanism.effective_joints[contact.joint].contact
+        law = run.system.joints[contact.joint].contact
         returned = restitution_of(contact.factor)
         if law is not None and not law.of.rigid and abs(returned - contact.restitution) > DIFFERS:
             what = f"{contact.joint}: with a stated restitution of {contact.restitution:.3g} the contact law {law.law} "

@@ -30,7 +30,6 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import Numbers
 from trunnion.model.parts import Driver
@@ -118,7 +117,7 @@ def of_several(mechanism: Mechanism) -> list[str]:
     if mechanism.space != "spatial" or not cut:
         return []
     nearby, joints = _loop(mechanism, cut), mechanism.effective_joints
-    return [name for name in joints if name in nearby and PAIRS[joints[name].type].count > 1]
+    return [name for name in joints if name in nearby and joints[name].pair.count > 1]
 
 
 # ---- links and joints -----------------------------------------------------------------------------------------
@@ -164,7 +163,7 @@ def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], ru
     joints = [
         name
         for name, joint in base.effective_joints.items()
-        if name not in base.drivers and name not in hung and PAIRS[joint.type].one_axis
+        if name not in base.drivers and name not in hung and joint.pair.one_axis
     ]
     joints.sort(key=lambda name: name not in nearby)
     best: tuple[tuple[int, int], tuple[str, ...]] | None = None
@@ -192,7 +191,7 @@ def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, f
     What they are stated to do otherwise is next to nothing, in the time of one cycle: it chooses the assembly there.
     """
     size, duration = single(run.system.size(run.values)), run.cycle.duration or 1.0
-    spans = {name: SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size) for name in coordinates}
+    spans = {name: SHARE * (1.0 if base.effective_joints[name].pair.turns else size) for name in coordinates}
     return {
         name: {
             "free": True,
@@ -247,7 +246,7 @@ def _hang(data: dict[str, Any], run: Run, walk: Forward, link: str) -> Starts:
 def _chain_of_joint(data: dict[str, Any], run: Run, walk: Forward, joint: str) -> Starts:
     """Single slides and turns for a joint of several freedoms. walk: at the start."""
     assert isinstance(walk, SpatialWalk)
-    kind, links = run.system.joints[joint]
+    kind, links = run.system.joints[joint].type, run.system.joints[joint].links
     first, second = (each(element, single) for element in walk.ends(joint))
     if kind == "cylindrical":  # it keeps its elements, and with them its turn and its slide
         motion = zip(walk.coordinates(joint), walk.rates(joint), strict=True)

@@ -209,7 +209,7 @@ class Stated:
         friction: dict[str, Any] = {**back.friction, **dict.fromkeys(joints, 0.0)}
         for joint in joints:
             reaction = back.reactions[self.parts[joint][-1]] if joint in self.parts else zero
-            second = system.joints[joint][1][1]
+            second = system.joints[joint].links[1]
             for contact, (state, push) in zip(self.contacts, touched, strict=True):
                 if contact.joint == joint:
                     along = push._replace(normal=0.0 * push.normal)
@@ -239,7 +239,7 @@ class Stated:
             )
             if isinstance(walk, SpatialWalk):
                 continue
-            first, second = (walk.motions[link] for link in walk.system.joints[joint][1])
+            first, second = (walk.motions[link] for link in walk.system.joints[joint].links)
             arrays["joint_rotation_velocity"][row, window] = second.twist.w - first.twist.w
             arrays["joint_rotation_acceleration"][row, window] = second.acceleration.w - first.acceleration.w
             motion = walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint)

@@ -34,7 +34,6 @@ from trunnion.dynamics.start import Places, initial_row, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import Figure, encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import Result, scales_in
@@ -184,7 +183,7 @@ def _refused(mechanism: Mechanism, motion: FreeMotion) -> Iterator[Finding]:
         where, motor = f"drivers.{name}", driver.motor
         if not driver.found:
             reasons[where] = follows
-        if driver.range is not None and PAIRS[joints[name].type].turns:
+        if driver.range is not None and joints[name].pair.turns:
             reasons[f"{where}.range"] = "it does not go round"
         if motor is not None:
             if motor.clutch is not None:

@@ -30,7 +30,6 @@ from trunnion.algebra.space import ORIGIN, Frame, compose, moment_at, slid
 from trunnion.algebra.vector import Vector3, cross, dot, length, minus, plus, scaled
 from trunnion.joints.contact import elastic_force, hertz_stiffness, normal_force
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
-from trunnion.joints.pairs import PAIRS
 from trunnion.solve import shifts
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import LoadAction
@@ -318,7 +317,7 @@ def contacts_of(run: Run, joints: Sequence[str]) -> tuple[Contact, ...]:
 
 
 def _of_joint(run: Run, name: str) -> Iterator[Contact]:
-    joint_entry, values = run.system.mechanism.effective_joints[name], run.values
+    joint_entry, values = run.system.joints[name], run.values
     contact, play = joint_entry.contact, shifts.play_of(run.system.mechanism.space, joint_entry.type, values, name)
     assert contact is not None  # the model's checks
     assert play is not None
@@ -345,10 +344,10 @@ def _of_joint(run: Run, name: str) -> Iterator[Contact]:
 
 def _in_plane(run: Run, name: str, wall: float, common: dict[str, Any]) -> Iterator[Contact]:
     """A pin, or the four corners of a slider."""
-    kind, (first, second) = run.system.joints[name]
+    first, second = run.system.joints[name].links
     values, holes = run.values, run.system.holes(run.values)
     places: list[Any] = [tuple(single(part) for part in holes[link, name]) for link in (first, second)]
-    if not PAIRS[kind].guided:
+    if not run.system.joints[name].pair.guided:
         pin, hole = places[0][:2], places[1][:2]
         yield PinContact(label=name, body=first, other=second, pin=pin, hole=hole, wall=wall, **common)
         return
@@ -366,7 +365,7 @@ def _in_plane(run: Run, name: str, wall: float, common: dict[str, Any]) -> Itera
 
 def _in_space(run: Run, name: str, play: shifts.Play, wall: float, common: dict[str, Any]) -> Iterator[Contact]:
     """The two ends of a hole, each with half the stiffness, and of a pin that does not slide its shoulders."""
-    _, (first, second) = run.system.joints[name]
+    first, second = run.system.joints[name].links
     holes = run.system.holes(run.values)
     axle, middle = (
         each(shifts.hole(holes[link, name], run.values, name), single) for link in (first, second)

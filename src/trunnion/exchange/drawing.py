@@ -316,7 +316,8 @@ def _in_joints(back: Backward, link: str, group: Sequence[str]) -> list[tuple[st
     """What the joints of a link with links outside of its group do to it."""
     walk, system = back.walk, back.walk.system
     forces: list[tuple[str, Any]] = []
-    for joint, (_, links) in system.joints.items():
+    for joint, entry in system.joints.items():
+        links = entry.links
         other = links[1 - links.index(link)] if link in links else link
         if other in group:
             continue

@@ -23,7 +23,6 @@ from trunnion.dynamics.result import Books
 from trunnion.dynamics.simulate import Continued
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.exchange.draft import Positions
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import read_mechanism
 
 MODEL = "model.yaml"  # beside this file
@@ -86,7 +85,7 @@ class Linkage(Fmi3Slave):  # type: ignore[misc]
         return units[last][turns]
 
     def _turns(self, driver: str) -> bool:
-        return PAIRS[self.mechanism.effective_joints[driver].type].turns
+        return self.mechanism.effective_joints[driver].pair.turns
 
     def _outputs(self, books: Books) -> Iterator[tuple[str, str, str, float]]:
         """Name, text, unit and value of every output."""

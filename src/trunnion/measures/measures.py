@@ -22,7 +22,6 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.dyad import DyadPose
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.tolerances import check_measure
 from trunnion.model.expression import Expression
 from trunnion.model.fields import course_kind, operands
@@ -349,9 +348,9 @@ def outputs(system: System) -> list[Measure]:
     ground, drivers = system.mechanism.fixed_link, system.mechanism.drivers
     return [
         Measure(f"{freedom}:{name}", freedom, name)
-        for name, (kind, links) in system.joints.items()
-        if ground in links and name not in drivers
-        for freedom in PAIRS[kind].motions
+        for name, joint in system.joints.items()
+        if ground in joint.links and name not in drivers
+        for freedom in joint.pair.motions
     ]
 
 

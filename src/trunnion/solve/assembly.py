@@ -350,11 +350,11 @@ def _plain(walk: Forward, module: Module) -> set[int]:
     numbers = [name for name, hint in mechanism.assembly.items() if not isinstance(hint, tuple)]
     spoken = set(re.findall(r"[\w-]+", json.dumps([[data.get(name) for name in SPEAKS], numbers], default=str)))
     for i, name in enumerate(module.links):
-        link, joints = mechanism.effective_links[name], {k for k, (_, on) in walk.system.joints.items() if name in on}
-        pins = [mechanism.effective_joints[joint].pin for joint in joints]
-        bare = link.mass.source == 0 and "inertia" not in link.model_fields_set and set(link.points) <= joints
-        inside = joints <= set(module.joints) and spoken.isdisjoint({name, *joints})
-        shifted = any(pin is not None and pin.offset is not None for pin in pins)
+        link = mechanism.effective_links[name]
+        joints = {key: joint for key, joint in walk.system.joints.items() if name in joint.links}
+        bare = link.mass.source == 0 and "inertia" not in link.model_fields_set and set(link.points) <= joints.keys()
+        inside = joints.keys() <= set(module.joints) and spoken.isdisjoint({name, *joints})
+        shifted = any(joint.pin is not None and joint.pin.offset is not None for joint in joints.values())
         if bare and inside and not shifted and not mechanism.loop:
             plain.add(i)
     return plain

@@ -280,7 +280,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, conditio
         joint = place.joint
         for i, rub in enumerate(() if place.witness or joint in system.screws else back.contacts.get(joint, ())):
             slope, slip, felt = _felt(back, joint, rub, conditions, i)
-            first, second = system.joints[joint][1]
+            first, second = system.joints[joint].links
             on = {first: walk.algebra.times(-1.0, rub.unit), second: rub.unit}
             units_ = [on.get(link, walk.algebra.ZERO_LOAD) for link in module.links]
             own = tuple(flat(rub.unit)) if rub.felt else None
@@ -376,7 +376,7 @@ def _record(
 ) -> None:
     """Keep a joint's reaction, friction and drive effort; load its known link with all three."""
     walk, algebra, joint = back.walk, back.walk.algebra, place.joint
-    turns, second = walk.system.turns(joint), walk.system.joints[joint][1][1]
+    turns, second = walk.system.turns(joint), walk.system.joints[joint].links[1]
     friction, (amount, loss) = algebra.ZERO_LOAD, back.threads.get(joint, (0.0, 0.0))
     for contact, rub, force in parts:
         if rub is not None:

@@ -21,7 +21,6 @@ from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Frame, Screw, about, moment_at
 from trunnion.algebra.vector import Vector3, cross, dot, minus, plus, scaled
 from trunnion.joints.contact_loads import BearingLoad, GuideLoad, PinLoad
-from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction import Rubbing
 
@@ -42,7 +41,7 @@ def bearing_ends(mechanism: Mechanism, joint: str) -> int:
     """How many ends of bearings a joint has: two of a bearing or guide whose length is stated, four of a cross; in the
     plane a pin bears its load in its middle."""
     joint_entry = mechanism.effective_joints[joint]
-    pair, spatial = PAIRS[joint_entry.type], mechanism.space == "spatial"
+    pair, spatial = joint_entry.pair, mechanism.space == "spatial"
     if pair.guided:
         return 2 if joint_entry.guide and joint_entry.guide.length is not None else 0
     has_length = joint_entry.pin is not None and (
@@ -53,7 +52,8 @@ def bearing_ends(mechanism: Mechanism, joint: str) -> int:
 
 def has_pressure(mechanism: Mechanism, joint: str) -> bool:
     """Whether the projected area of a joint's pin is stated."""
-    pin, pair = mechanism.effective_joints[joint].pin, PAIRS[mechanism.effective_joints[joint].type]
+    joint_entry = mechanism.effective_joints[joint]
+    pin, pair = joint_entry.pin, joint_entry.pair
     sized = pin is not None and pin.radius is not None and (pin.bearing is not None or pin.length is not None)
     return sized and pair.turns and not pair.ball and not pair.threaded
 
@@ -64,7 +64,7 @@ def loads_on_ends(walk: Forward, joint: str, reaction: Any, friction: Any) -> li
     Friction with two contacts counts these. End 1 is that at −u. On the pins of a cross, that of the first link before
     that of the second, the friction of each bears on the other.
     """
-    path, pair = f"joints.{joint}", PAIRS[walk.system.joints[joint][0]]
+    path, pair = f"joints.{joint}", walk.system.joints[joint].pair
     length = walk.values[f"{path}.guide.length" if pair.guided else f"{path}.pin.bearing"]
     if not isinstance(walk, SpatialWalk):
         axis, second = walk.ends(joint)

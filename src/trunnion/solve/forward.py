@@ -23,7 +23,7 @@ from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, minus, plus, scaled, transpose
 from trunnion.groups.tree import Element
 from trunnion.joints.contact_loads import Reaction
-from trunnion.joints.pairs import PAIRS, Pair
+from trunnion.joints.pairs import Pair
 from trunnion.model.parts import InertiaTensor
 from trunnion.solve import shifts
 from trunnion.solve.system import Place, System, Values, driven_coordinates
@@ -117,7 +117,7 @@ class Forward:
 
     def pair(self, joint: str) -> Pair:
         """The kind of a joint."""
-        return PAIRS[self.system.joints[joint][0]]
+        return self.system.joints[joint].pair
 
     def element(self, link: str, joint: str) -> Any:
         """Global frame of a joint's element on a link."""
@@ -128,12 +128,12 @@ class Forward:
 
     def ends(self, joint: str) -> tuple[Any, Any]:
         """Global frames of the two elements of a joint."""
-        first, second = self.system.joints[joint][1]
+        first, second = self.system.joints[joint].links
         return self.element(first, joint), self.element(second, joint)
 
     def against(self, joint: str) -> Any:
         """Twist of the second link of a joint against the first."""
-        first, second = self.system.joints[joint][1]
+        first, second = self.system.joints[joint].links
         return self.algebra.minus(self.motions[second].twist, self.motions[first].twist)
 
     def speed(self, joint: str) -> Number:
@@ -142,7 +142,7 @@ class Forward:
 
     def noise(self, joint: str, turns: bool) -> Number:
         """Rate of turn or slide of a joint, rad/s or m/s, below which its sign is rounding noise."""
-        first, second = self.system.joints[joint][1]
+        first, second = self.system.joints[joint].links
         turn = ZERO_SLIP * (self.spins[first] + self.spins[second] + self.pace)
         return turn if turns else turn * self.size
 
@@ -259,7 +259,7 @@ class Forward:
     def rates(self, joint: str) -> tuple[Number, Number]:
         """Rates of the coordinates, rad/s and m/s."""
         if self.system.turns(joint):
-            first, second = self.system.joints[joint][1]
+            first, second = self.system.joints[joint].links
             return self.motions[second].twist.w - self.motions[first].twist.w, 0.0
         axis, at = self.ends(joint)
         x, y = plane.velocity_at(self.against(joint), plane.place_of(at))
@@ -267,7 +267,7 @@ class Forward:
 
     def second_rates(self, joint: str) -> tuple[Number, Number]:
         """Their derivatives, rad/s² and m/s²; the Coriolis part 2 ω × ṡ lies across the slide."""
-        first, second = (self.motions[link] for link in self.system.joints[joint][1])
+        first, second = (self.motions[link] for link in self.system.joints[joint].links)
         if self.system.turns(joint):
             return second.acceleration.w - first.acceleration.w, 0.0
         axis, at = self.ends(joint)
@@ -279,7 +279,7 @@ class Forward:
     def hole(self, joint: str) -> Any:
         """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide; in
         space z along the axis, in the middle of the bearing."""
-        second = self.system.joints[joint][1][1]
+        second = self.system.joints[joint].links[1]
         hole = self.algebra.compose(self.motions[second].frame, self.holes[second, joint])
         return shifts.hole(hole, self.values, joint)
 
@@ -413,7 +413,7 @@ class SpatialWalk(Forward):
 
     def second_rates(self, joint: str) -> tuple[Number, Number]:
         """θ̈ and s̈ of a joint on one axis: with ẑ carried by the first link, (ẑ · V)˙ = ẑ · V̇ + (Ω × ẑ) · V."""
-        first, second = (self.motions[link] for link in self.system.joints[joint][1])
+        first, second = (self.motions[link] for link in self.system.joints[joint].links)
         *_, axis, place = self.ends(joint)[1]
         relative, rate = self.against(joint), space.minus(second.acceleration, first.acceleration)
         carried = cross(first.twist.u, axis)

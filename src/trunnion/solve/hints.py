@@ -17,7 +17,7 @@ from trunnion.algebra.dual import primal, single
 from trunnion.algebra.namespace import Number, each, flat
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.tree import Element
-from trunnion.joints.pairs import PAIRS
+from trunnion.joints.pairs import Pair
 from trunnion.model.names import as_key
 from trunnion.model.parts import AT, FOLDS
 from trunnion.solve.forward import Forward
@@ -115,9 +115,9 @@ def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, .
         if f"{path}.x" in walk.values:
             link, _, name = key.partition(".")
             if key in walk.system.joints:
-                kind, links = walk.system.joints[key]
-                inside = [other for other in links if other in module.links]
-                settled = key in module.joints and PAIRS[kind].meets and len(inside) == 1
+                joint = walk.system.joints[key]
+                inside = [other for other in joint.links if other in module.links]
+                settled = key in module.joints and joint.pair.meets and len(inside) == 1
                 link, name = (inside[-1], key) if inside and not settled else ("", "")
             if link in module.links:
                 place = tuple(walk.values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in walk.values)
@@ -163,7 +163,7 @@ def coordinate(walk: Forward, module: Module, frames: Sequence[Any], joint: str,
         outer = walk.element(link, joint)
         return outer if lane is None else each(outer, lambda n: lane_of(n, lane))
 
-    first, second = walk.system.joints[joint][1]
+    first, second = walk.system.joints[joint].links
     return walk.coordinate(joint, element(first), element(second))
 
 
@@ -177,8 +177,8 @@ def joint_rows(walk: Forward, module: Module, count: int, frames: Sequence[Any],
     spins = [({module.links[i] for i in members}, ends) for members, ends in spun_sets(group)]
     rows: Rows = {}
     for name in sorted(set(module.joints).difference(module.driven), key=walk.system.order.__getitem__):
-        kind, links = walk.system.joints[name]
-        pair, number = PAIRS[kind], module.joints.index(name)
+        pair, links = walk.system.joints[name].pair, walk.system.joints[name].links
+        number = module.joints.index(name)
         turned = walk.system.spatial and pair.turns and not pair.ball
         if not turned and not set(links).issubset(module.links):
             continue
@@ -203,17 +203,17 @@ def drawn_at(walk: Forward, times: Array) -> int | None:
     if system.mechanism.loop or system.mechanism.gears or not system.mechanism.drivers:
         return None
     elements = {key: each(frame, single) for key, frame in system.stated_elements(walk.values).items()}
-    ends = {name: [elements[link, name] for link in links] for name, (_, links) in system.joints.items()}
-    if not all(_meets(system, kind, ends[name], size) for name, (kind, _) in system.joints.items()):
+    ends = {name: [elements[link, name] for link in joint.links] for name, joint in system.joints.items()}
+    if not all(_meets(system.spatial, joint.pair, ends[name], size) for name, joint in system.joints.items()):
         return None
     driven = {name: single(walk.coordinate(name, *ends[name])) for name in system.mechanism.drivers}
     return _nearest(walk, times, driven)
 
 
-def _meets(system: System, kind: str, ends: Sequence[Any], size: float) -> bool:
+def _meets(spatial: bool, pair: Pair, ends: Sequence[Any], size: float) -> bool:
     """Whether two elements of a joint coincide, but for what it lets move."""
-    pair, (first, second) = PAIRS[kind], ends
-    if not system.spatial:
+    first, second = ends
+    if not spatial:
         away, along = np.subtract(second[:2], first[:2]) / size, np.array(first[2:])
         if not pair.guided:
             return bool(np.linalg.norm(away) < MEETS)
@@ -283,7 +283,7 @@ def remarks(walk: Forward, module: Module, count: int, named: int | None, tied: 
         joint = module.joints[len(module.joints) // 2]
         joint = joint if joint in free else free[0]
         place, hint = "where a point is", "[x, y]"
-        if system.spatial and PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop:
+        if system.spatial and system.joints[joint].pair.meets and not system.mechanism.loop:
             hint = "[x, y, z]"
         elif system.spatial:
             place, hint = "how far a joint has turned", "60 deg"

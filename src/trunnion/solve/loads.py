@@ -207,7 +207,7 @@ def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share
 
 def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> LoadAction:
     """An effort in the freedom of a joint, on its second link by its first: N m about its axis, or N along it."""
-    first, second = walk.system.joints[joint][1]
+    first, second = walk.system.joints[joint].links
     wrench, times = walk.axis(joint, turns)[1], walk.algebra.times
     return LoadAction([(second, times(effort, wrench)), (first, times(-effort, wrench))], effort * speed)
 

@@ -16,7 +16,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.gear import rotation
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly import Chosen, choose
 from trunnion.solve.backward import Backward, Given, Sense, row_code, solve
@@ -224,7 +223,7 @@ def built(mechanism: Mechanism) -> System:
 
 def _comes_back(run: Run) -> bool:
     """Whether the links are after a period of the drivers where they were, which a nut or rack that goes on is not."""
-    threaded = any(PAIRS[kind].threaded for kind, _ in run.system.joints.values())
+    threaded = any(joint.pair.threaded for joint in run.system.joints.values())
     racks = any(gear.slides for gear in run.system.mechanism.gears.values())
     if not (run.cycle.periodic and (threaded or racks)):
         return True
@@ -251,7 +250,7 @@ def _unknown_turns(run: Run) -> dict[str, float]:
         # up to just before the end: there a track begins again
         time = np.linspace(0.0, duration * (1 - 1e-9), TURN_STEPS)
         walk = forward(run.system, run.values, run.chosen.assembly, time)
-        first, second = (walk.motions[link].frame for link in run.system.joints[joint][1])
+        first, second = (walk.motions[link].frame for link in run.system.joints[joint].links)
         angle = np.unwrap(np.ravel(rotation((first, second))))
         turns = (angle[-1] - angle[0]) / (2 * np.pi)
         fraction = np.rint(COMMON_TURNS * turns) / COMMON_TURNS

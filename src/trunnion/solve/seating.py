@@ -32,7 +32,6 @@ from trunnion.algebra.namespace import Number, each, flat
 from trunnion.algebra.panels import FIT, ON_GRID, ORDER, POINTS
 from trunnion.errors import Status
 from trunnion.joints.clearance import pressed, turned_by_friction
-from trunnion.joints.pairs import PAIRS
 from trunnion.solve.backward import Backward, Sense, status_of
 from trunnion.solve.forward import Travel, posed
 from trunnion.solve.friction_method import FrictionMethod
@@ -287,7 +286,7 @@ def end_loads(run: Run, method: FrictionMethod) -> EndLoads:
     seats, joints = sorted(run.seats, key=lambda seat: seat.given is not None), list[str]()
     system, count = run.system, run.system.mechanism.coordinates
     for joint in dict.fromkeys([*rubbing(system), *system.resisted]):  # each contact of them is that of one freedom
-        pair, summed = PAIRS[system.joints[joint][0]], system.summed(joint) and joint not in system.resisted
+        pair, summed = system.joints[joint].pair, system.summed(joint) and joint not in system.resisted
         if pair.one_axis and (len(pair.freedoms) == 1 or summed):
             joints.append(joint)
     ends, first = [], 0
@@ -298,7 +297,7 @@ def end_loads(run: Run, method: FrictionMethod) -> EndLoads:
     rates = first + 1 + count * len(system.joints)
     senses, last = {}, rates
     for joint in joints:
-        senses[joint] = slice(last, last := last + len(PAIRS[system.joints[joint][0]].freedoms))
+        senses[joint] = slice(last, last := last + len(system.joints[joint].pair.freedoms))
     vectors = [[[first + 1 + count * i + k for k in range(count)]] for i in range(len(system.joints))]
     if system.mechanism.space == "spatial":
         sides = [[(end.seat.play.model.ends[end.number][0][0], end) for end in ends if end.seat.joint == joint]

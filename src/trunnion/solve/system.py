@@ -27,8 +27,7 @@ from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
-from trunnion.joints.pairs import PAIRS
-from trunnion.model.joint_parts import Losses
+from trunnion.model.joint_parts import Joint, Losses
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.solve import shifts
@@ -156,18 +155,17 @@ class System:
             turned = {} if self.spatial else dict(zip(module.joints, module.reversed_, strict=True))
             row = []
             for name in (*module.joints, *module.witnesses):
-                kind, (first, second) = self.joints[name]
-                reversed_ = turned.get(name, False)
+                (first, second), reversed_ = self.joints[name].links, turned.get(name, False)
                 links = (second, first) if reversed_ else (first, second)
                 outer = (links[0] not in module.links, links[1] not in module.links)
-                row.append(Place(name, kind, links, outer, reversed_))
+                row.append(Place(name, self.joints[name].type, links, outer, reversed_))
             rows.append(tuple(row))
         return tuple(rows)
 
-    @cached_property
-    def joints(self) -> dict[str, tuple[str, tuple[str, str]]]:
-        """Kind and links of every joint, as the file has them."""
-        return {name: (joint.type, joint.links) for name, joint in self.mechanism.effective_joints.items()}
+    @property
+    def joints(self) -> Mapping[str, Joint]:
+        """Every joint, with the defaults merged in."""
+        return self.mechanism.effective_joints
 
     @cached_property
     def order(self) -> dict[str, int]:
@@ -176,24 +174,24 @@ class System:
 
     def resting(self, joint: str) -> int:
         """How many contacts of a joint rest or slip each by itself: a cross has two pins, a sleeve turns and slides."""
-        pair = PAIRS[self.joints[joint][0]]
+        pair = self.joints[joint].pair
         return 2 if pair.crossed or (len(pair.freedoms) == 2 and self.summed(joint)) else 1
 
     def summed(self, joint: str) -> bool:
         """Whether the parts of a joint's load or slip count one by one, not as a vector.  [P 15-19]"""
-        friction = self.mechanism.effective_joints[joint].friction
+        friction = self.joints[joint].friction
         return friction is not None and friction.model == "pezzuti"
 
     def turns(self, joint: str) -> bool:
         """Whether a joint's coordinate, as drivers and loads see it, is an angle."""
-        return PAIRS[self.joints[joint][0]].turns
+        return self.joints[joint].pair.turns
 
     @cached_property
     def points(self) -> tuple[tuple[str, str], ...]:
         """(link, point) of every named point; the joints of a loop are points of its links."""
         points = [(name, point) for name, link in self.mechanism.effective_links.items() for point in link.points]
         if self.mechanism.loop:
-            points += [(link, joint) for joint, (_, links) in self.joints.items() for link in links]
+            points += [(link, name) for name, joint in self.joints.items() for link in joint.links]
         return tuple(dict.fromkeys(points))
 
     def _group(self, module: Module, places: Sequence[Place]) -> Any:
@@ -217,7 +215,7 @@ class System:
         if module.kind == "CCC":
             elements = self.elements(self.mechanism.parameters())
             sides = (
-                [elements[link, name].z for name in names if link in self.joints[name][1]] for link in module.links
+                [elements[link, name].z for name in names if link in self.joints[name].links] for link in module.links
             )
             if all(abs(float(dot(first, second))) <= 1 - 1e-12 for first, second in sides):  # else no closed form
                 return CylindricalDyad(2, joints)
@@ -277,17 +275,18 @@ class System:
         Seats are in the elements of the links that carry them.
         """
         elements = self.holes(values)
-        for name, (kind, (first, second)) in self.joints.items():
-            for link, carrier in ((first, shifts.PIN), (second, shifts.HOLE)):
+        for name, joint in self.joints.items():
+            for link, carrier in zip(joint.links, (shifts.PIN, shifts.HOLE), strict=True):
                 element = elements[link, name]
-                elements[link, name] = shifts.seated(self.mechanism.space, element, kind, values, name, carrier)
+                elements[link, name] = shifts.seated(self.mechanism.space, element, joint.type, values, name, carrier)
         return elements
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:
         """The same where every pin lies in the middle of its hole."""
         elements = self.stated_elements(values)
-        for name, (_, (_, second)) in self.joints.items():
-            elements[second, name] = shifts.misaligned(self.mechanism.space, elements[second, name], values, name)
+        for name, joint in self.joints.items():
+            end = joint.links[1], name
+            elements[end] = shifts.misaligned(self.mechanism.space, elements[end], values, name)
         return elements
 
     def stated_elements(self, values: Values) -> dict[tuple[str, str], Any]:
@@ -295,15 +294,15 @@ class System:
         if self.mechanism.loop:
             return self._loop_elements(values)
         elements: dict[tuple[str, str], Any] = {}
-        for name, (kind, links) in self.joints.items():
-            for link in links:
+        for name, joint in self.joints.items():
+            for link in joint.links:
                 path, point = f"links.{link}.points.{name}", self.mechanism.links[link].points[name]
                 place: Any = self.vector(values, path)
                 if self.spatial:
                     axis: Any = self.vector(values, f"{path}.axis") if point.axis is not None else (0.0, 0.0, 1.0)
                     x: Any = self.vector(values, f"{path}.x") if point.x is not None else None
                     elements[link, name] = space.element(place, axis, x)
-                elif "planar" in PAIRS[kind].needs_axis:
+                elif "planar" in joint.pair.needs_axis:
                     ax, ay = self.vector(values, f"{path}.axis")
                     length = namespace(ax, ay).hypot(ax, ay)
                     elements[link, name] = plane.Frame(place[0], place[1], ax / length, ay / length)
@@ -340,7 +339,7 @@ class System:
 
         The joints of a screw in the plane are two, and neither is helical.
         """
-        return values[f"joints.{joint}.pitch"] / (2 * np.pi) if PAIRS[self.joints[joint][0]].threaded else 0.0
+        return values[f"joints.{joint}.pitch"] / (2 * np.pi) if self.joints[joint].pair.threaded else 0.0
 
     def support(self, values: Values, joint: str) -> Support:
         """How a joint holds its second link, where statics leaves its reaction open."""
@@ -362,8 +361,7 @@ class System:
     @cached_property
     def lossy(self) -> dict[str, Losses]:
         """Joints with losses that do not follow their load."""
-        joints = self.mechanism.effective_joints.items()
-        return {name: joint.losses for name, joint in joints if joint.losses is not None}
+        return {name: joint.losses for name, joint in self.joints.items() if joint.losses is not None}
 
     @cached_property
     def resisted(self) -> dict[str, set[bool]]:
@@ -550,7 +548,7 @@ def build(mechanism: Mechanism, inverse: Any = None) -> System:
     findings = []
     for name, joint in mechanism.effective_joints.items() if mechanism.space == "spatial" else ():
         law = joint.friction.law if joint.friction else None
-        if law and FRICTION_LAWS[law].relaxation is not None and PAIRS[joint.type].count > 1:
+        if law and FRICTION_LAWS[law].relaxation is not None and joint.pair.count > 1:
             # a deflection is followed along one way only
             what = f"the bristles of the law {law} bend in one direction, the slip of a {joint.type} joint has several"
             remedy = "use coulomb, viscous, stribeck or brown-mcphee here"
@@ -598,7 +596,7 @@ def driven_coordinates(
 
 def rubbing(system: System) -> list[str]:
     """Joints that have friction."""
-    return [name for name, joint in system.mechanism.effective_joints.items() if joint.friction is not None]
+    return [name for name, joint in system.joints.items() if joint.friction is not None]
 
 
 def felt(system: System, values: Values) -> list[str]:
@@ -624,7 +622,7 @@ def scale_of(system: System, values: Values, joint: str) -> str:
 
 def law_of(system: System, joint: str) -> FrictionLaw:
     """Friction law of a joint that has friction."""
-    friction = system.mechanism.effective_joints[joint].friction
+    friction = system.joints[joint].friction
     return FRICTION_LAWS[friction.law if friction and friction.law else "coulomb"]
 
 

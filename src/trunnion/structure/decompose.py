@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from trunnion.errors import Finding, MechanismError, counted
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.generic import GEAR, SPIN, Constraint, Gears, Joints, Places, constraints, fault, rank
 from trunnion.structure.graph import components, longest_loop, matching, ordered
@@ -70,7 +69,7 @@ class Plan:
 
 def taken(mechanism: Mechanism, joint: str) -> int:
     """Freedoms that a joint takes."""
-    pair = PAIRS[mechanism.effective_joints[joint].type]
+    pair = mechanism.effective_joints[joint].pair
     freed = len(pair.freedoms) if mechanism.space == "planar" else pair.count
     return FREEDOMS[mechanism.space] - freed
 
@@ -221,7 +220,7 @@ class LinkTable:
 
     def symbol(self, joint: str) -> str:
         """The letter of a joint in the formula."""
-        return PAIRS[self.joints[joint].type].symbol
+        return self.joints[joint].pair.symbol
 
     def module(self, links: list[str], placed: set[str], gears: list[str]) -> Module:
         """The module that the given links form on the links known so far, and through these gear pairs."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.joints.pairs import PAIRS, Pair
+from trunnion.joints.pairs import Pair
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.graph import reached
 
@@ -31,7 +31,7 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     spins: dict[str, tuple[str, str]] = {}
     if mechanism.space == "planar" or mechanism.loop:
         return spins
-    pairs = {name: PAIRS[joint.type] for name, joint in mechanism.joints.items()}
+    pairs = {name: joint.pair for name, joint in mechanism.joints.items()}
     turning = [
         name
         for name, pair in pairs.items()

@@ -208,7 +208,7 @@ class AssemblyStudy:
         if np.any(opened):
             findings = []
             for name in dict.fromkeys(end.joint for end in self.pins):
-                model = CLEARANCE_MODELS["spatial"][system.joints[name][0]]
+                model = CLEARANCE_MODELS["spatial"][system.joints[name].type]
                 if model.size and not np.all(primal(shifts.length_of(model, values, name)) > 0):
                     part, keys = model.size
                     what = f"how far the {part} can lean in its play depends on its length, which is not stated"

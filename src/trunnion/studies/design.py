@@ -21,7 +21,6 @@ from trunnion.algebra.panels import CANCELLED, GAUSS_WEIGHTS, INTEGRAL, ON_GAUSS
 from trunnion.cycle.course import Mean, course_of, magnitude
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import pressure_angles
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -199,7 +198,7 @@ def instant_centres(walk: Forward, count: int, most: int) -> list[Centre]:
     """
     mechanism = walk.system.mechanism
     links = sorted(mechanism.links, key=lambda link: link != mechanism.fixed_link)
-    pivots = {frozenset(ends): name for name, (kind, ends) in walk.system.joints.items() if kind == "revolute"}
+    pivots = {frozenset(joint.links): name for name, joint in walk.system.joints.items() if joint.type == "revolute"}
     centres = []
     for pair in combinations(links, 2):
         if len(links) > most and mechanism.fixed_link not in pair:
@@ -238,12 +237,12 @@ def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
     ground, crank = mechanism.fixed_link, driver.links[0]
     a = driver.joints[0]
     b, c, d = dyad.joints
-    if crank not in run.system.joints[b][1]:
+    if crank not in run.system.joints[b].links:
         b, d = d, b
-    if crank not in run.system.joints[b][1] or ground not in run.system.joints[d][1]:
+    if crank not in run.system.joints[b].links or ground not in run.system.joints[d].links:
         return ""
-    coupler = next(link for link in run.system.joints[b][1] if link != crank)
-    rocker = next(link for link in run.system.joints[d][1] if link != ground)
+    coupler = next(link for link in run.system.joints[b].links if link != crank)
+    rocker = next(link for link in run.system.joints[d].links if link != ground)
 
     def span(link: str, first: str, two: str) -> float:
         p, q = local[link, first], local[link, two]
@@ -334,13 +333,13 @@ def _numbers(walk: Forward, time: Array) -> dict[tuple[str, str], Number]:
     system, driver = walk.system, next(iter(walk.system.mechanism.drivers), "")
     ground, drivers = system.mechanism.fixed_link, system.mechanism.drivers
     numbers: dict[tuple[str, str], Number] = {}
-    for joint, (kind, links) in system.joints.items():
-        if ground not in links:
+    for name, joint in system.joints.items():
+        if ground not in joint.links:
             continue
-        if joint not in drivers:
-            numbers["speed", joint] = walk.speed(joint)
-        if PAIRS[kind].turns:
-            link = next(link for link in links if link != ground)
+        if name not in drivers:
+            numbers["speed", name] = walk.speed(name)
+        if joint.pair.turns:
+            link = next(link for link in joint.links if link != ground)
             motion = walk.motions[link]
             frame, w, alpha = motion.frame, motion.twist.w, motion.acceleration.w
             for axis, c, s in (("x", frame.c, frame.s), ("y", -frame.s, frame.c)):  # −(α × r − ω² r) of 1 kg at R p
@@ -443,7 +442,7 @@ def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figu
     turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
     figures = [Figure("grashof", "four-bar type (Grashof)", answer.grashof)] if answer.grashof else []
-    if driver and not answer.transmission_angle and mechanism.fixed_link not in run.system.joints[driver][1]:
+    if driver and not answer.transmission_angle and mechanism.fixed_link not in run.system.joints[driver].links:
         why = f"{driver} drives two moving links; both are of a driver on {mechanism.fixed_link}"
         figures.append(Figure("transmission_angle", "four-bar type and transmission angle", None, "°", note=why))
     for name, angle in answer.transmission_angle.items():
@@ -475,7 +474,7 @@ def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figu
     if turns and driver and run.cycle.periodic and answer.mean_speed:
         subject = f"flywheel for a fluctuation of {fluctuation:g}"
         figures.append(Figure("flywheel", subject, answer.flywheel(fluctuation), "kg m^2"))
-    if any(PAIRS[kind].turns and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
+    if any(joint.pair.turns and mechanism.fixed_link in joint.links for joint in run.system.joints.values()):
         weights, left = counterweights(run)
         if np.isfinite(left):  # without mass there is nothing to balance
             for weight in weights:

@@ -229,8 +229,8 @@ def _findings(study: ToleranceStudy, table: Table, readings: Sequence[Reading]) 
         yield Finding.warning("play.redundant", "joints", what)
     models = CLEARANCE_MODELS[mechanism.space]
     kinds = [
-        f"{name} ({kind})" for name, (kind, _) in run.system.joints.items()
-        if kind not in models and clearance(name, run.values) is not None
+        f"{name} ({joint.type})" for name, joint in run.system.joints.items()
+        if joint.type not in models and clearance(name, run.values) is not None
     ]  # fmt: skip
     if kinds:
         what, remedy = f"the play of {', '.join(kinds)} is left out", f"play is modelled in {', '.join(models)} joints"

@@ -34,7 +34,6 @@ from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.measured import LONGER, courses_in_time, not_steady
 from trunnion.errors import Finding, MechanismError, Severity, Status, agreeing, counted
-from trunnion.joints.pairs import PAIRS
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
@@ -225,7 +224,7 @@ def _dataset(
     names = [number.name for number in swept]
     # the largest reaction of all; of a point that locks they are ∞, beside which every other would be rounding
     scales, reactions = scales_of(run), arrays["reaction_max"]
-    errors = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
+    errors = ["m" if joint.pair.guided else "rad" for joint in run.system.joints.values()]
     units = {**member_units(run.system), "transmission_error": MemberUnits("joint", errors)}
     variables = described(arrays, {name: variable.over(*names) for name, variable in figures.items()}, units)
     along: dict[str, xr.Variable] = {}

@@ -14,7 +14,6 @@ from trunnion.algebra.course import Place
 from trunnion.cycle.course import CycleCourse, Means, magnitude
 from trunnion.cycle.locking_course import least_margin
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure, named
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
@@ -212,8 +211,7 @@ def reduced(
     means = course.means
     joints, drivers = range(len(system.joints)), range(len(system.mechanism.drivers))
     if ideal:
-        slides = [PAIRS[kind].guided for kind, _ in system.joints.values()]
-        names = [f"joint_{'slide' if slide else 'rotation'}_error" for slide in slides]
+        names = [f"joint_{'slide' if joint.pair.guided else 'rotation'}_error" for joint in system.joints.values()]
         figures["transmission_error_max"] = [
             _value(course.extreme(name, i, of=magnitude)) for i, name in enumerate(names)
         ]

@@ -213,8 +213,8 @@ def _model(question: Asked) -> dict[str, Any]:
     drawn_scene, system = scene(result, max_positions=MOST_STEPS), state.run.system
     mechanism = system.mechanism
     # what has a worst corner: none where nothing has a tolerance or a play; joints whose pins lie nowhere in their play
-    loose = [name for name, (kind, _) in system.joints.items()
-             if play_of(mechanism.space, kind, state.run.values, name) is not None]  # fmt: skip
+    loose = [name for name, joint in system.joints.items()
+             if play_of(mechanism.space, joint.type, state.run.values, name) is not None]  # fmt: skip
     varies = loose or mechanism.tolerated()
     measures = (chosen(mechanism, None, state.run.values) or outputs(system)) if varies else []
     return head | {
@@ -541,7 +541,7 @@ def _corner(question: Asked) -> dict[str, Any]:
     result = result_of(there, positions(there, steps, margin=False, averaged=False)).dataset
     drawn_scene = scene(result, max_positions=steps)
     for joint in inputs.loose:
-        play, links = inputs.play(joint, corner.numbers), run.system.joints[joint][1]
+        play, links = inputs.play(joint, corner.numbers), run.system.joints[joint].links
         guide = play.model.size is not None and play.model.size[0] == "guide"
         drawn_scene["built"]["seats"].append({
             "joint": joint, "kind": "guide" if guide else "pin", "clearance": float(np.ravel(primal(play.radii[0]))[0]),

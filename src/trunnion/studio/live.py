@@ -176,8 +176,8 @@ class Live:
         moving = {}
         if not self.few:  # where each joint and each free point goes that moves, at as many positions as can be drawn
             ground = system.mechanism.fixed_link
-            still = {name for name, (_, links) in system.joints.items() if ground in links and system.turns(name)}
-            ends = {(links[1], name) for name, (_, links) in system.joints.items() if name not in still}
+            still = {name for name, joint in system.joints.items() if ground in joint.links and system.turns(name)}
+            ends = {(joint.links[1], name) for name, joint in system.joints.items() if name not in still}
             ends |= {(link, name) for link, name in system.points if link != ground and name not in system.joints}
             time = self.time[:: -(-len(ends) * self.steps // MOST_TRACKED)]
             moving = {"tracks": tracks(self.run.posed(time, self.numbers), len(time), ends)}

@@ -285,7 +285,7 @@ def blocks_of(system: System, result: xr.Dataset) -> dict[str, Any]:
         home |= dict.fromkeys(module.links, count)
         inner = []
         for joint in module.joints:
-            kind, links = system.joints[joint]
+            kind, links = system.joints[joint].type, system.joints[joint].links
             earlier = next((link for link in links if home.get(link, count) != count), None)
             if earlier is None:
                 inner.append(joint)
@@ -314,7 +314,7 @@ def _passing(system: System, result: xr.Dataset, joint: str, earlier: str, later
     if not system.spatial:
         forward["angle"] = result["link_angle"].sel(link=earlier).values
         forward["rate"] = result["link_angle_velocity"].sel(link=earlier).values
-    sign = -1.0 if system.joints[joint][1][1] == later else 1.0  # reactions are on the second link, by the first
+    sign = -1.0 if system.joints[joint].links[1] == later else 1.0  # reactions are on the second link, by the first
     moment = sign * result["reaction_moment"].sel(joint=joint).values
     friction = result["friction_torque" if system.turns(joint) else "friction_force"].sel(joint=joint).values
     back = {

@@ -191,7 +191,7 @@ class Model:
                 overrides[path] = Dual(np.full((len(seed), 1), at[p] + errors.get(path, 0.0)), seed)
         values = mechanism.parameters(overrides)
         for seat in self.run.seats:
-            play = shifts.play_of(mechanism.space, self.run.system.joints[seat.joint][0], values, seat.joint)
+            play = shifts.play_of(mechanism.space, self.run.system.joints[seat.joint].type, values, seat.joint)
             if play is not None:
                 values.update(play.model.paths(f"seats.{seat.joint}", shifts.given_offsets(values, seat.joint, play)))
         return values

@@ -24,7 +24,6 @@ from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Pose, Tree
-from trunnion.joints.pairs import PAIRS
 from trunnion.results.quantities import readable
 from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
@@ -163,7 +162,7 @@ def _spins(walk: Forward) -> tuple[dict[str, float], dict[str, float]]:
         centre = pose.elements[a if group.joints[a].pair.ball else b].second.place
         drag: Any = 0.0
         for name in joints:
-            sign = 1.0 if walk.system.joints[name][1][1] in members else -1.0
+            sign = 1.0 if walk.system.joints[name].links[1] in members else -1.0
             drag = drag + sign * dot(moment_at(back.friction_wrenches[name], centre), axis)
         if _largest(drag) > PRESENT * force * size:
             dragged[link] = _largest(drag)
@@ -296,7 +295,7 @@ class Determinacy:
             if link in self.spins:
                 what = f"{who} may spin about {points[0]}-{points[1]}, but a torque of up to "
                 what += f"{readable(self.spins[link], 'N m')} acts about that line"
-                ball = next(name for name in points if PAIRS[self.system.joints[name][0]].ball)
+                ball = next(name for name in points if self.system.joints[name].pair.ball)
                 remedy = f"make it symmetric about the line, or {ball} a universal joint, which holds the spin"
                 # joints that err a little leave the line, and the spin is no less free
                 say = Finding.warning if self.system.mechanism.has_errors else Finding.error
@@ -305,7 +304,7 @@ class Determinacy:
 
     def _shared(self, part: ModuleDeterminacy, what: str, figures: Mapping[str, Any]) -> Iterator[Finding]:
         """How redundant joints share their load."""
-        joints = self.system.mechanism.effective_joints
+        joints = self.system.joints
         lacking = [name for name in part.joints if joints[name].stiffness is None]
         if 0 < len(lacking) < len(part.joints):
             lack = f"the stiffness of {', '.join(lacking)} is not stated, that of the joints beside is"

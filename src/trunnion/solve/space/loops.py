@@ -37,7 +37,6 @@ from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
-from trunnion.joints.pairs import PAIRS
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import posed, start
@@ -90,12 +89,12 @@ class LinearLoops(NamedTuple):
 def ends_of(system: System, values: Values, every_pin: bool) -> list[End]:
     """The ends of all plays that are stated, and of pins that state none if `every_pin`; NaN lengths are left in."""
     ends: list[End] = []
-    for name, (kind, _) in system.joints.items():
-        model = CLEARANCE_MODELS["spatial"].get(kind)
+    for name, joint in system.joints.items():
+        model = CLEARANCE_MODELS["spatial"].get(joint.type)
         if model is None:
             continue
-        play = shifts.play_of("spatial", kind, values, name)
-        pin = PAIRS[kind].bored
+        play = shifts.play_of("spatial", joint.type, values, name)
+        pin = joint.pair.bored
         for k, keys in enumerate(model.ends):
             radius = float(np.ravel(primal(play.radii[k]))[0]) if play else 0.0
             radial = pin and k not in model.axial

@@ -134,7 +134,7 @@ class Inputs:
 
     def play(self, joint: str, values: Mapping[str, Number]) -> Play:
         """The play of a loose or held joint with these numbers."""
-        play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint][0], values, joint)
+        play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint].type, values, joint)
         assert play is not None  # else it would be neither
         return play
 
@@ -213,8 +213,8 @@ def inputs_of(run: Run) -> Inputs:
 def plays_of(run: Run) -> dict[str, Play]:
     """The plays of all joints that have one; MechanismError for one without a length over which its pin leans."""
     space, plays = run.system.mechanism.space, dict[str, Play]()
-    for name, (kind, _) in run.system.joints.items():
-        if (play := shifts.play_of(space, kind, run.values, name)) is not None:
+    for name, joint in run.system.joints.items():
+        if (play := shifts.play_of(space, joint.type, run.values, name)) is not None:
             plays[name] = play
     findings = [finding for name, play in plays.items() for finding in shifts.unstated_length(name, play)]
     if findings:

@@ -18,7 +18,7 @@ from trunnion.cycle.model_measures import watched
 from trunnion.cycle.positions import ALL, Kept, Positions
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.scene import load_courses, scene_of
-from trunnion.errors import Status
+from trunnion.errors import Finding, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import ANY
@@ -59,10 +59,8 @@ def result_of(run: Run, at: Positions, selection: Kept = ALL) -> Result:
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
     attributes = encoded(
         {
-            **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
+            **provenance(run.system, [*findings(cycle), *measured.findings], mobility=run.system.plan.mobility),
             "method": at.method.name,
-            **cited(references(mechanism)),
-            "findings": finding_rows([*findings(cycle), *measured.findings]),
             **scales_of(run).summary([*figures(cycle), *measured.summary()]),
             **({"locking_ranges": near.attribute(at.time)} if near and near.pushed() else {}),
             **drawn,
@@ -97,6 +95,13 @@ def member_units(system: System) -> dict[str, MemberUnits]:
         **units("driver", map(system.turns, system.mechanism.drivers), drives),
         **units("spring", (spring.joint is not None and system.turns(spring.joint) for spring in springs), pulls),
     }
+
+
+def provenance(system: System, findings_made: Iterable[Finding], **more: Any) -> dict[str, Any]:
+    """Where a result comes from, what it is founded on, and what there is to say of it. more: see `origin`."""
+    mechanism = system.mechanism
+    attributes = {**origin(mechanism, system.plan.formula, **more), **cited(references(mechanism))}
+    return {**attributes, "findings": finding_rows(findings_made)}
 
 
 def references(mechanism: Mechanism) -> list[str]:

@@ -22,7 +22,7 @@ from trunnion.cycle import fill
 from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
-from trunnion.cycle.summary import inputs, member_units, references
+from trunnion.cycle.summary import inputs, member_units, provenance
 from trunnion.dynamics.findings import motion_findings, stated_drivers, undefined
 from trunnion.dynamics.measured import steady_figures
 from trunnion.dynamics.motor import switched
@@ -34,7 +34,7 @@ from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contact, ContactState, Push, pushes_of
 from trunnion.errors import Finding, Status
 from trunnion.results import variables as results
-from trunnion.results.attributes import Figure, cited, encoded, finding_rows, origin
+from trunnion.results.attributes import Figure, encoded
 from trunnion.results.dataset import Result, Scales, Variable, dataset_of, described
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_middle
@@ -372,11 +372,9 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) 
         "contact_pins": [contact.label for contact in contacts if contact.bored],
     }
     attributes = encoded({
-        **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
-        **cited(references(mechanism)),
+        **provenance(system, findings, mobility=system.plan.mobility),
         "free_drivers": stated_drivers(motion, run),
         "duration": duration,
-        "findings": finding_rows(findings),
         **(labelled if contacts else {}),
         **scales.summary(_summary(motion, integrated, run, scales)),
         "inputs": inputs(mechanism),
@@ -455,64 +453,57 @@ def spectrum(time: Array, forces: Array) -> tuple[Array, Array]:
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
-def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) -> Sequence[Figure]:
+def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) -> Iterator[Figure]:
     """The figures that one looks at first; none of a motion that does not begin."""
-    figures: list[Figure] = []
     solution, course, names = integrated.solution, integrated.course, list(run.system.mechanism.drivers)
     if course is None:
-        return figures
+        return
     for i, name in enumerate(stated_drivers(motion, run)):
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
         unit, speed = "rad/s" if turns else "m/s", f"speed of {name}"
         value, time = course.farthest(i)
-        figures.append(Figure(f"{name}.speed_max", speed, value, unit, "largest", f"at {time:.4g} s"))
+        yield Figure(f"{name}.speed_max", speed, value, unit, "largest", f"at {time:.4g} s")
         last, end = float(course.last.at.rate[i, 0]), f"at {solution.end:.4g} s"
-        figures.append(Figure(f"{name}.speed_end", speed, last, unit, "at the end", end))
+        yield Figure(f"{name}.speed_end", speed, last, unit, "at the end", end)
         value, time = course.farthest(course.counts[0] + names.index(name))
         # of others it is rounding; where nothing has inertia at a dead centre there is none
         if motion.system.mechanism.drivers[name].motor is not None and np.isfinite(value):
-            subject, when = f"drive {'torque' if turns else 'force'} of {name}", f"at {time:.4g} s"
-            figures.append(Figure(f"{name}.effort_max", subject, value, effort, "largest", when))
-        figures += steady_figures(motion, solution, i)
+            subject = f"drive {'torque' if turns else 'force'} of {name}"
+            yield Figure(f"{name}.effort_max", subject, value, effort, "largest", f"at {time:.4g} s")
+        yield from steady_figures(motion, solution, i)
     ended = solution.ended is not None and solution.ended.code == "simulate.change_point"
     if not ended and not any(event.kind == "change-point" for event in solution.events):  # there they have no bound
         for i, joint in enumerate(run.system.joints):
             value, time = course.reaction(i)
             if value > 0:
-                subject, when = f"reaction in {joint}", f"at {time:.4g} s"
-                figures.append(Figure(f"{joint}.reaction_max", subject, value, "N", "largest", when))
-    figures += _impact_figures([contact.label for contact in motion.contacts], solution.impacts, solution.end)
+                name, when = f"{joint}.reaction_max", f"at {time:.4g} s"
+                yield Figure(name, f"reaction in {joint}", value, "N", "largest", when)
+    for contact in motion.contacts:
+        of_contact = [impact for impact in solution.impacts if impact.label == contact.label]
+        yield from _impact_figures(contact.label, of_contact, solution.end)
     for key, work in zip(solution.layout.works_named, course.last.works, strict=True):
         if abs(work[0]) > scales.floor("J"):
-            figures.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))
-    figures.append(Figure("energy_residual", "largest error of the energy account", course.worst, "J"))
-    return figures
+            yield Figure(f"work_{key}", WORDS[key], float(work[0]), "J")
+    yield Figure("energy_residual", "largest error of the energy account", course.worst, "J")
 
 
-def _impact_figures(labels: Sequence[str], impacts: Sequence[Impact], end: float) -> list[Figure]:
-    """What a summary says of every contact: how often and how hard it touches, for how long, and how much it wears."""
-    figures: list[Figure] = []
-    for label in labels:
-        of_contact = [impact for impact in impacts if impact.label == label]
-        figures.append(Figure(f"{label}.impacts", f"contacts of {label}", float(len(of_contact)), "1"))
-        if not of_contact:
-            continue
-        long = sum((impact.end if np.isfinite(impact.end) else end) - impact.begin for impact in of_contact)
-        if struck := [impact for impact in of_contact if np.isnan(impact.force)]:  # of rigid bodies: without a force
-            hardest = max(struck, key=lambda impact: impact.impulse)
-            subject, when = f"impulse in {label}", f"at {hardest.begin:.4g} s"
-            figures.append(Figure(f"{label}.impulse_max", subject, hardest.impulse, "N s", "largest", when))
-        if pushed := [impact for impact in of_contact if np.isfinite(impact.force)]:
-            most = max(pushed, key=lambda impact: impact.force)
-            subject, when = f"contact force in {label}", f"in the contact from {most.begin:.4g} s"
-            figures.append(Figure(f"{label}.contact_force_max", subject, most.force, "N", "largest", when))
-        if (depth := max(impact.depth for impact in of_contact)) > 0:
-            figures.append(Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"))
-        speed, wear = max(impact.approach for impact in of_contact), sum(impact.wear for impact in of_contact)
-        share = long / end if end else np.nan
-        figures += [
-            Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest"),
-            Figure(f"{label}.contact_time", f"time in contact of {label}", share, "1", "of all"),
-            Figure(f"{label}.wear", f"wear index of {label}", wear, "J"),
-        ]
-    return figures
+def _impact_figures(label: str, impacts: Sequence[Impact], end: float) -> Iterator[Figure]:
+    """What a summary says of a contact: how often and how hard it touches, for how long, and how much it wears."""
+    yield Figure(f"{label}.impacts", f"contacts of {label}", len(impacts))
+    if not impacts:
+        return
+    long = sum((impact.end if np.isfinite(impact.end) else end) - impact.begin for impact in impacts)
+    if struck := [impact for impact in impacts if np.isnan(impact.force)]:  # of rigid bodies: without a force
+        hardest = max(struck, key=lambda impact: impact.impulse)
+        when = f"at {hardest.begin:.4g} s"
+        yield Figure(f"{label}.impulse_max", f"impulse in {label}", hardest.impulse, "N s", "largest", when)
+    if pushed := [impact for impact in impacts if np.isfinite(impact.force)]:
+        most = max(pushed, key=lambda impact: impact.force)
+        when = f"in the contact from {most.begin:.4g} s"
+        yield Figure(f"{label}.contact_force_max", f"contact force in {label}", most.force, "N", "largest", when)
+    if (depth := max(impact.depth for impact in impacts)) > 0:
+        yield Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest")
+    speed, wear = max(impact.approach for impact in impacts), sum(impact.wear for impact in impacts)
+    yield Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest")
+    yield Figure(f"{label}.contact_time", f"time in contact of {label}", long / end if end else np.nan, aspect="of all")
+    yield Figure(f"{label}.wear", f"wear index of {label}", wear, "J")

@@ -26,7 +26,7 @@ from trunnion.algebra.dual import single
 from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
-from trunnion.cycle.summary import inputs, references
+from trunnion.cycle.summary import inputs, provenance
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.measures.measures import MOTIONS, Measure, chosen
@@ -34,7 +34,7 @@ from trunnion.measures.positions import place_of
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import Figure, cited, finding_rows, origin
+from trunnion.results.attributes import Figure
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.quantities import readable
 from trunnion.solve.friction_method import FrictionMethod
@@ -342,8 +342,7 @@ def _dataset(
             ),
         ]
     attributes = {
-        **origin(system.mechanism, system.plan.formula),
-        **cited(references(system.mechanism)),
+        **provenance(system, findings),
         "limits": [reading.limit for reading in readings],
         "inputs": inputs(system.mechanism),
         "drive": dial.of,
@@ -351,7 +350,6 @@ def _dataset(
         "periodic": int(run.cycle.periodic),
         "places": [[reading.kind, reading.place] for reading in readings],
         **scales_of(run).summary(summary),
-        "findings": finding_rows(findings),
     }
     members = {"measure": MemberUnits("measure", units)}
     members["sensitivity"] = MemberUnits("measure", [f"{unit}/m" for unit in units])

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.scales import scales_of
-from trunnion.cycle.summary import references
+from trunnion.cycle.summary import provenance
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
-from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
 from trunnion.statistics import intervals
@@ -124,15 +123,14 @@ VARIABLES: dict[str, Variable] = {
 def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     """The numbers of all methods with all that is said of them."""
     study, table = outcome.study, outcome.table
-    system, mechanism = study.run.system, study.run.system.mechanism
+    system = study.run.system
     counted = sampled(outcome.samples, study, table) if outcome.samples else None
     job = outcome.samples.job if outcome.samples else None
-    findings = [*findings_of(outcome, counted), *notes]
     arrays = {**_linear(study, table), **_worst(outcome), **(counted or {})}
     arrays |= outcome.indices.arrays if outcome.indices else {}
     units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
     curve_units = [measure.unit(system) for measure in study.measures]
-    kinds = mechanism.parameter_kinds()
+    kinds = system.mechanism.parameter_kinds()
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in study.inputs.names]
     dial = system.dial(study.run.values, table.plan.times)
     variables = described(arrays, VARIABLES, _units(units, curve_units, parameter_units, dial.unit))
@@ -145,8 +143,7 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     labels = {dim: names for dim, names in labels.items() if dim in used}
     quantiles = {"quantile": ("quantile", np.array(QUANTILES))} if "quantile" in used else {}
     attributes: dict[str, Any] = {
-        **origin(mechanism, system.plan.formula),
-        **cited(references(mechanism)),
+        **provenance(system, [*findings_of(outcome, counted), *notes]),
         "methods": outcome.methods,
         "sampling": job.method if job else "",
         "engine": job.engine if job else "numpy",
@@ -169,7 +166,6 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
         "periodic": int(study.run.cycle.periodic),
         "steps": outcome.steps,
         **scales_of(study.run).summary(summary(outcome, counted, units, dial)),
-        "findings": finding_rows(findings),
     }
     return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(table.plan.times, *dial)})
 

@@ -108,7 +108,7 @@ def test_a_load_that_no_position_meets_is_in_the_extremes():
 def test_bends_are_where_the_model_switches():
     run = prepare(press())
     (found,) = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
-    degrees = found / run.cycle.duration * 360
+    degrees = np.array([bend.time for bend in found]) / run.cycle.duration * 360
     # Q turns round where the crank is upright, S in its dead centres: sin φ = −offset/(r + l), offset/(l − r)
     dead = [np.degrees(np.arcsin(-60 / 200)) % 360, 180 - np.degrees(np.arcsin(60 / 120))]
     for place in (340, 343, 90, 270, *dead):

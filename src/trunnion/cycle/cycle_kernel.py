@@ -244,8 +244,8 @@ class Many:
         """Courses of some mechanisms between the places where they, or the same without errors, switch."""
         every = [bends(item) for item in (of, without) if item is not None]
         breaks = [
-            breaks_between(cycle, np.concatenate(breaks_each))
-            for cycle, *breaks_each in zip(of.cycles, *every, strict=True)
+            breaks_between(cycle, np.array([bend.time for row in bends_each for bend in row]))
+            for cycle, *bends_each in zip(of.cycles, *every, strict=True)
         ]
         with np.errstate(all="ignore"):
             return Courses.many(look, breaks, sizes, accuracy_of(self.run.cycle, accuracy))

@@ -92,8 +92,9 @@ def places(motion: FreeMotion, drivers: Collection[str] | None = None) -> Places
         for time in sorted(set(meeting))
     ]
     met = tuple((begin + speed * time, module) for time, module in meetings)
-    times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
-    coordinates, span = begin + speed * np.append(times, [time for time, _ in meetings]), abs(speed) * cycle.duration
+    (stated,) = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))
+    times = np.array([*(bend.time for bend in stated), *(time for time, _ in meetings)])
+    coordinates, span = begin + speed * times, abs(speed) * cycle.duration
     if cycle.periodic:
         return Places(_apart(np.mod(coordinates, span), span), span, {name: (-np.inf, np.inf)}, met)
     low, high = sorted((begin, begin + speed * cycle.duration))

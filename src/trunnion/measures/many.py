@@ -40,7 +40,6 @@ from trunnion.solve.switches import (
     breaks_between,
     near,
     shifts_of,
-    stated_bends,
     tracked,
 )
 from trunnion.solve.system import Values
@@ -114,7 +113,7 @@ class Group:
         """Where the nominal mechanism switches, within its cycle."""
         run = self.run
         alone = Mechanisms(run.system, run.chosen.assembly, self.values, [run.cycle])
-        every = run.bends if self.values is run.values else stated_bends(alone)
+        every = run.bends if self.values is run.values else bends(alone)[0]
         return [bend for bend in every if matters(bend, self.measures)]
 
     @cached_property
@@ -442,7 +441,8 @@ class Group:
                 switching = breaks_own
             elif self.bends or not self.of_motion:
                 cycles = [replace(cycle, duration=cycle.duration * float(length)) for length in ratio]
-                switching = bends(Mechanisms(run.system, run.chosen.assembly, block_values, cycles))
+                every = bends(Mechanisms(run.system, run.chosen.assembly, block_values, cycles))
+                switching = [np.array([bend.time for bend in row]) for row in every]
             breaks = [
                 breaks_between(cycle, np.concatenate([bend / length, more]), *self.span)
                 for bend, length in zip(switching, ratio, strict=True)

@@ -25,7 +25,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.inverse import Inverse, driven_at_outputs
 from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
-from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
+from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, bends, breaks_between
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
 TURN_STEPS = 720
@@ -125,8 +125,8 @@ class Run:
     def bends(self) -> list[Bend]:
         """Where in the cycle its forces may jump or bend as the model says it, in no order; see `switches`."""
         passed = {time for met in self.chosen.meetings.values() for place in met.at for time in place}
-        bends = stated_bends(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))
-        return [*bends, *(Bend(time) for time in sorted(passed))]
+        (stated,) = bends(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))
+        return [*stated, *(Bend(time) for time in sorted(passed))]
 
     @np.errstate(all="ignore")
     def courses(

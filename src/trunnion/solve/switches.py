@@ -120,21 +120,11 @@ def _scans(system: System) -> list[_Scan]:
     return scans
 
 
-def bends(of: Mechanisms) -> list[Array]:
-    """Times, s, of every mechanism at which its forces may jump or bend, in no order."""
-    times: list[list[float]] = [[] for _ in of.cycles]
-    for row, bend in _bends(of):
-        times[row].append(bend.time)
-    return [np.array(time, float) for time in times]
-
-
-def stated_bends(of: Mechanisms) -> list[Bend]:
-    """Where the forces of one mechanism may jump or bend, with what it is that does, so that it can be `tracked`."""
-    return [bend for _, bend in _bends(of)]
-
-
-def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
-    yield from ((row, Bend(moment)) for row, moment in knots_of(of))
+def bends(of: Mechanisms) -> list[list[Bend]]:
+    """Where the forces of every mechanism may jump or bend, in no order; those of one can be `tracked` in others."""
+    of_each: list[list[Bend]] = [[] for _ in of.cycles]
+    for row, moment in knots_of(of):
+        of_each[row].append(Bend(moment))
     duration = np.array([cycle.duration for cycle in of.cycles])
     turns = max(1.0, np.ceil(max(cycle.turns for cycle in of.cycles) - 1e-9))
     for number, scan in enumerate(_scans(of.system)):
@@ -153,7 +143,8 @@ def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
         if len(every.row):
             times = _located(every, partial(scan.number, of, every.row, every.function), duration[every.row])
             for row, moment, function, level in zip(every.row, times, every.function, every.level, strict=True):
-                yield int(row), Bend(float(moment), number, int(function), float(level))
+                of_each[row].append(Bend(float(moment), number, int(function), float(level)))
+    return of_each
 
 
 def tracked(of: Mechanisms, bends: Sequence[Bend], moved: Callable[[Values, Array], Number]) -> Array:

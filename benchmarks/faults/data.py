@@ -235,8 +235,8 @@ _VIEWS = (
     Fault(
         "efficiency-difference-sign",
         "views/compare.py",
-        "_plain(c), _plain(m - c),",
-        "_plain(c), _plain(c - m),",
+        "(m, u, c, m - c)",
+        "(m, u, c, c - m)",
         ("tests/views/test_compare.py", "-k", "tables or difference"),
     ),
     Fault(

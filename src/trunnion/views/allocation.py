@@ -16,7 +16,7 @@ from trunnion.views.axis import names
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe
 from trunnion.views.curves import check_kind
 from trunnion.views.page import NONE, Section, Table
-from trunnion.views.readings import is_play, readings, share, share_interval
+from trunnion.views.readings import is_play, plain, readings, share, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,10 +67,10 @@ def bought(result: xr.Dataset) -> Table:
             text = f"{'' if is_play(paths[j]) else '±'}{width * factor:.5g}"
             widths.append(joined(text, unit) if math.isfinite(width) else NONE)
         cost, part, before = (float(result[key].values[j]) for key in ("cost", "cost_share", "cost_before"))
-        rows.append([paths[j], widths[0], str(result["choice"].values[j]), groups.get(paths[j], ""), _cost(cost),
-                     share(part, 1), widths[1], _cost(before)])  # fmt: skip
+        rows.append([paths[j], widths[0], str(result["choice"].values[j]), groups.get(paths[j], ""), plain(cost, ".6g"),
+                     share(part, 1), widths[1], plain(before, ".6g")])  # fmt: skip
     total, before = (float(result[key]) for key in ("cost_total", "cost_total_before"))
-    rows.append(["all", "", "", "", _cost(total), share(1.0), "", _cost(before)])
+    rows.append(["all", "", "", "", plain(total, ".6g"), share(1.0), "", plain(before, ".6g")])
     head = ["parameter", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
     return Table("allocated tolerances", head, rows).without_empty()
 
@@ -87,7 +87,7 @@ def room(result: xr.Dataset) -> Table:
         wider = 0.01 * read.value("saving") * min(abs(lower), abs(upper))
         rows.append([read.name, read.limits_said, _percent(read.value("used")), margin,
                      _percent(max(shares, default=math.nan)), _percent(read.value("yield")),
-                     f"{wider:.4g}" if math.isfinite(wider) else NONE])  # fmt: skip
+                     plain(wider, ".4g")])  # fmt: skip
     head = ["measure", "limits", "used", "margin", "worst case found", "yield", "1\u00a0% wider saves"]
     return Table("share of the limits that is used", head, rows).without_empty()
 
@@ -95,14 +95,10 @@ def room(result: xr.Dataset) -> Table:
 def offers(result: xr.Dataset) -> Table:
     """Cost over accuracy."""
     rows = [
-        [f"{100 * factor:.4g}\u00a0%", _cost(cost) if math.isfinite(cost) else "infeasible"]
+        [f"{100 * factor:.4g}\u00a0%", plain(cost, ".6g") if math.isfinite(cost) else "infeasible"]
         for factor, cost in zip(result["trade_off_factor"].values, result["trade_off_cost"].values, strict=True)
     ]
     return Table("cost over accuracy", ["limits, relative to stated", "minimum cost"], rows)
-
-
-def _cost(cost: float) -> str:
-    return f"{cost:.6g}" if math.isfinite(cost) else NONE
 
 
 def _percent(value: float) -> str:

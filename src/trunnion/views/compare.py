@@ -24,6 +24,7 @@ from trunnion.views.axis import Abscissa, Array, names, over_turn
 from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe
 from trunnion.views.curves import check_kind, nth, silent
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
+from trunnion.views.readings import plain
 from trunnion.views.sweep import Scale
 
 if TYPE_CHECKING:
@@ -221,8 +222,8 @@ def results(result: xr.Dataset, channel: int | None = None) -> Table:
             bias = with_uncertainty(sizes[2] * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
         turned, display_unit = prefixed(at, str(result.attrs["drive_unit"]))
         place = setting(at * turned, display_unit) if np.isfinite(at) else NONE
-        shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
-        return [errors, largest, place, bias, *shares, _plain(alike), verdict(result, i, k)]
+        shares = (plain(100 * part, ".1f", "%") for part in (within, least))
+        return [errors, largest, place, bias, *shares, plain(alike, ".4f"), verdict(result, i, k)]
 
     return _by_condition("results", RESIDUAL, result, channel, cells)
 
@@ -258,14 +259,10 @@ def efficiencies(result: xr.Dataset) -> list[Table]:
     words = {1: "within", 0: "not within", -1: "unknown"}
     first, short = shortened(names(result, "condition"))
     keys = ("efficiency", "efficiency_expanded", "efficiency_model", "efficiency_within")
-    rows = [[name, _plain(m), _plain(u), _plain(c), _plain(m - c), words[int(within)]]
+    rows = [[name, *(plain(value, ".4f") for value in (m, u, c, m - c)), words[int(within)]]
             for name, m, u, c, within in zip(short, *(result[key].values for key in keys), strict=True)]  # fmt: skip
     head = [first, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
     return [Table("efficiency", head, rows)]
-
-
-def _plain(value: float) -> str:
-    return f"{value:.4f}".replace("-", "−") if np.isfinite(value) else NONE
 
 
 def conditions(result: xr.Dataset) -> Table:

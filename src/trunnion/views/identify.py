@@ -17,6 +17,7 @@ from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, N
 from trunnion.views.compare import about_data, data_section, of_model, shortened
 from trunnion.views.curves import check_kind
 from trunnion.views.page import NONE, Section, Table, counts, page
+from trunnion.views.readings import plain
 from trunnion.views.sweep import thinned
 
 if TYPE_CHECKING:
@@ -78,17 +79,12 @@ class Estimate:
             return [self.lacking, NONE, "", ""]
         source = max(self.shares, key=self.shares.__getitem__, default="")
         tail = [f"{self.freedom:.0f}" if self.freedom < MANY else "∞",
-                f"{source} {_percent(self.shares[source])}" if source else ""]  # fmt: skip
+                f"{source} {plain(100 * self.shares[source], '.0f', '%')}" if source else ""]  # fmt: skip
         if self.limit:
             interval = f"up to {self.say(self.upper)}" if self.limit < 0 else f"from {self.say(self.lower)}"
             return [f"{self.say(self.value)} (limit)", interval, *tail]
         interval = f"{self.say(self.lower, unit=False)}\u00a0to\u00a0{self.say(self.upper)}"
         return [f"{self.say(self.value, unit=False)}\u00a0±\u00a0{self.say(self.half)}", interval, *tail]
-
-
-def _percent(part: float) -> str:
-    """A share in whole percent."""
-    return NONE if not math.isfinite(part) else f"{100 * part:.0f}\u00a0%"
 
 
 def estimates(result: xr.Dataset) -> list[Estimate]:
@@ -137,7 +133,7 @@ def correlations(result: xr.Dataset) -> list[Table]:
     every, values = estimates(result), result["correlation"].values
     identified = [p for p, row in enumerate(every) if row.identifiable]
     rows = [
-        [f"{k} {every[p].short}", *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in identified)]
+        [f"{k} {every[p].short}", *(plain(values[p, q], ".2f") if q <= p else "" for q in identified)]
         for k, p in enumerate(identified, 1)
     ]
     head = ["", *(str(k) for k in range(1, len(rows) + 1))]
@@ -271,7 +267,8 @@ def report(result: xr.Dataset) -> str:
     identified = [row for row in rows if row.identifiable]
     sources = [name for name in names(result, "source") if any(row.shares[name] >= LEAST for row in identified)]
     budget = Table("uncertainty budget", ["share of the variance", *(row.short for row in identified)],
-                   [[name, *(_percent(row.shares[name]) for row in identified)] for name in sources])  # fmt: skip
+                   [[name, *(plain(100 * row.shares[name], ".0f", "%") for row in identified)]
+                    for name in sources])  # fmt: skip
     after = [estimated(result).titled(""), *([budget] if identified else []), *sensors(result)]
     parts = [Section("Estimates", pictures=[("Estimates", figure(result, "intervals"))], after=after)]
     parts += [Section("Correlation", after=[table]) for table in correlations(result)]

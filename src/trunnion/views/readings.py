@@ -34,6 +34,11 @@ def fixed(value: float, decimals: int) -> str:
     return text.replace(",", "\u202f").replace("-", "−" if float(text.replace(",", "")) else "")
 
 
+def plain(value: float, form: str, unit: str = "") -> str:
+    """A number in a format of Python with a true minus and its unit; "—" for what is not finite."""
+    return joined(f"{value:{form}}".replace("-", "−"), unit) if math.isfinite(value) else NONE
+
+
 def rounded(value: float, digits: int = 6) -> str:
     """A number with at most so many significant digits, a true minus and a sign for what has no end."""
     return f"{value + 0.0:.{digits}g}".replace("inf", "∞").replace("-", "−")

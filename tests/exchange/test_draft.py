@@ -1,10 +1,7 @@
 """Drafts: a mechanism as bodies and pairs in one frame, and the model file made of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,16 +13,15 @@ import trunnion
 from trunnion.exchange.draft import Body, Draft, Pair, moved, positions_of, steiner
 from trunnion.exchange.formats import FORMATS
 from trunnion.exchange.model_file import complete, model_text
-from trunnion.model.mechanism import Mechanism
 
 
-def read(text: str, folder: Path) -> Mechanism:
+def read(text, folder):
     path = folder / "model.yaml"
     path.write_text(text, "utf-8")
     return trunnion.read(path)
 
 
-def four_bar() -> Draft:
+def four_bar():
     return positions_of(trunnion.read(Path("examples/durango-fourbar.yaml")), 4).draft()
 
 
@@ -35,9 +31,7 @@ TURNED = ("durango-fourbar", "slider-crank", "jansen", "rssr", "double-cardan", 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=6)
 @given(name=st.sampled_from(TURNED), seed=st.integers(0, 2**31 - 1))
-def test_the_drive_torque_does_not_depend_on_the_frame(
-    name: str, seed: int, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_the_drive_torque_does_not_depend_on_the_frame(name, seed, tmp_path_factory):
     stated = trunnion.read(Path("examples") / f"{name}.yaml")
     stated = stated.with_friction("off").model_copy(update={"loads": {}, "measures": {}})
     draft = positions_of(stated, 4).draft()
@@ -53,7 +47,7 @@ def test_the_drive_torque_does_not_depend_on_the_frame(
     np.testing.assert_allclose(abs(found), abs(expected), atol=1e-8 * np.nanmax(abs(expected)))
 
 
-def test_fixed_pairs_make_one_body_with_the_mass_of_both_and_the_name_of_the_ground() -> None:
+def test_fixed_pairs_make_one_body_with_the_mass_of_both_and_the_name_of_the_ground():
     one = Body("one", 2.0, np.array([0.0, 0.0, 0.0]), np.diag([1.0, 2.0, 3.0]))
     two = Body("two", 1.0, np.array([3.0, 0.0, 0.0]), np.diag([1.0, 1.0, 1.0]))
     pairs = {
@@ -74,7 +68,7 @@ def test_fixed_pairs_make_one_body_with_the_mass_of_both_and_the_name_of_the_gro
     )
 
 
-def test_ground_and_drive_are_taken_where_the_file_says_neither_and_said_so() -> None:
+def test_ground_and_drive_are_taken_where_the_file_says_neither_and_said_so():
     draft = replace(four_bar(), ground="", drives={})
     made = complete(draft)
     assert made.ground == "ground"
@@ -82,7 +76,7 @@ def test_ground_and_drive_are_taken_where_the_file_says_neither_and_said_so() ->
     assert [finding.code for finding in made.findings] == ["exchange.ground", "exchange.drive"]
 
 
-def test_names_and_comments_of_any_kind_stay_names_and_comments(tmp_path: Path) -> None:
+def test_names_and_comments_of_any_kind_stay_names_and_comments(tmp_path):
     draft = four_bar()
     names = dict(zip(draft.bodies, ("yes", 'a "b" \\ c', "Kurbel: Ø 8 # links", "杆"), strict=True))
     bodies = {names[name]: replace(body, name=names[name]) for name, body in draft.bodies.items()}
@@ -94,7 +88,7 @@ def test_names_and_comments_of_any_kind_stay_names_and_comments(tmp_path: Path) 
     assert set(made.links) == set(names.values())
 
 
-def test_extensions_that_nothing_reads_are_refused(tmp_path: Path) -> None:
+def test_extensions_that_nothing_reads_are_refused(tmp_path):
     path = tmp_path / "model.xyz"
     path.write_text("text")
     with pytest.raises(trunnion.MechanismError, match=r"'\.xyz', which is not read here"):
@@ -109,7 +103,7 @@ def test_extensions_that_nothing_reads_are_refused(tmp_path: Path) -> None:
                 trunnion.exchange.import_file(tmp_path / f"missing{suffix}")
 
 
-def test_a_speed_is_one_of_the_joint_that_it_drives() -> None:
+def test_a_speed_is_one_of_the_joint_that_it_drives():
     draft = replace(four_bar(), drives={})
     driven = next(iter(complete(draft).drives))
     assert complete(draft, drive=driven, speed=3.0, turns=True).drives == {driven: 3.0}
@@ -129,14 +123,14 @@ def test_a_speed_is_one_of_the_joint_that_it_drives() -> None:
         ("links", ("crank", "wall"), "joins 'wall', which it does not have"),
     ],
 )
-def test_what_is_no_body_or_pair_is_refused(part: str, value: Any, says: str) -> None:
+def test_what_is_no_body_or_pair_is_refused(part, value, says):
     draft = four_bar()
     setattr(next(iter((draft.bodies if part in ("mass", "centre") else draft.pairs).values())), part, value)
     with pytest.raises(trunnion.MechanismError, match=says):
         draft.checked()
 
 
-def test_a_drive_with_limits_keeps_within_them(tmp_path: Path) -> None:
+def test_a_drive_with_limits_keeps_within_them(tmp_path):
     draft = four_bar()
     driven = next(iter(draft.drives))
     draft.pairs[driven] = replace(draft.pairs[driven], limits=(np.radians(-11), np.radians(17)))

@@ -1,12 +1,8 @@
 """DXF out: what is drawn comes back, and the force polygons close and are those of an independent calculation."""
 
-from __future__ import annotations
-
 import math
 import re
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import ezdxf
 import numpy as np
@@ -16,7 +12,6 @@ import trunnion
 from mechanisms import DURANGO
 from trunnion.exchange import export_model, import_file
 from trunnion.exchange.draft import positions_of
-from trunnion.model.mechanism import Mechanism
 
 EXAMPLES = DURANGO.parent
 ROUND = ("durango-fourbar", "slider-crank", "scotch-yoke", "jansen", "whitworth-quick-return", "toggle-press",
@@ -27,9 +22,9 @@ QUICK = ("durango-fourbar", "geared-five-bar", "fourbar-with-play")
 AB, BC, CD, AD = 2.0, 6.0, 3.0, 5.5  # of the four-bar of [D], Table 1
 
 
-def lines(path: Path) -> dict[str, list[Any]]:
+def lines(path):
     """The lines of a drawing by layer, as (start, end) in mm."""
-    drawn: dict[str, list[Any]] = {}
+    drawn = {}
     for line in ezdxf.readfile(path).modelspace().query("LINE"):
         ends = [np.array(end.xyz) for end in (line.dxf.start, line.dxf.end)]
         drawn.setdefault(line.dxf.layer, []).append(ends)
@@ -38,7 +33,7 @@ def lines(path: Path) -> dict[str, list[Any]]:
 
 @pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("name", ROUND)
-def test_what_is_drawn_comes_back(name: str, tmp_path: Path) -> None:
+def test_what_is_drawn_comes_back(name, tmp_path):
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
     at = None if name in ("toggle-press", "stick-slip-drive", "peaucellier") else "77deg"
     export_model(mechanism, tmp_path / "out.dxf", at)
@@ -66,7 +61,7 @@ def test_what_is_drawn_comes_back(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", FORCED)
-def test_every_force_polygon_of_the_file_closes_head_to_tail(name: str, tmp_path: Path) -> None:
+def test_every_force_polygon_of_the_file_closes_head_to_tail(name, tmp_path):
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
     time = 0.37 * float(positions_of(mechanism, 2).result["time"].values[1]) * 2
     export_model(mechanism, tmp_path / "out.dxf", f"{time:.9g}s")
@@ -78,20 +73,20 @@ def test_every_force_polygon_of_the_file_closes_head_to_tail(name: str, tmp_path
             assert np.linalg.norm(end - start) <= 1e-9 * perimeter, layer
 
 
-def durango(friction: str) -> Mechanism:
+def durango(friction):
     mechanism = trunnion.read(DURANGO)
     return mechanism if friction == "on" else mechanism.with_friction("off")
 
 
-def forces(path: Path) -> dict[str, dict[str, tuple[float, np.ndarray]]]:
+def forces(path):
     """Size by its label, N, and vector by its line and scale, N, of every force of every polygon."""
     space = ezdxf.readfile(path).modelspace()
-    drawn: dict[str, dict[str, tuple[float, np.ndarray]]] = {}
+    drawn = {}
     for layer, sides in lines(path).items():
         if not layer.startswith("~forces") or " round " in layer:
             continue
         texts = [text.dxf.text for text in space.query(f'TEXT[layer=="{layer}"]')]
-        scale = float(next(re.search(r"([\d.e+-]+) N/mm", text) for text in texts if "N/mm" in text)[1])  # type: ignore[index]
+        scale = float(next(re.search(r"([\d.e+-]+) N/mm", text) for text in texts if "N/mm" in text)[1])
         labels = [text.rsplit(": ", 1) for text in texts if "N/mm" not in text]
         drawn[layer] = {
             name: (float(size.removesuffix(" N")), scale * (end - start)[:2])
@@ -100,7 +95,7 @@ def forces(path: Path) -> dict[str, dict[str, tuple[float, np.ndarray]]]:
     return drawn
 
 
-def poses(angle: float) -> np.ndarray:
+def poses(angle):
     """Of the four-bar of [D]: x, y, turn of crank, coupler and rocker at their mass centres; its own closed form."""
     b = AB * np.exp(1j * angle)
     d = complex(AD)
@@ -112,7 +107,7 @@ def poses(angle: float) -> np.ndarray:
     return np.array([[p.real, p.imag, t] for p, t in zip(centres, (angle, coupler, rocker), strict=True)])
 
 
-def reactions(angle: float, speed: float = 10.0) -> dict[str, np.ndarray]:
+def reactions(angle, speed=10.0):
     """Forces of [D 2-7] without friction at a crank angle: inertia by differences, statics by one linear system."""
     step = 1e-4
     second = (poses(angle + step) - 2 * poses(angle) + poses(angle - step)) / step**2 * speed**2
@@ -126,7 +121,7 @@ def reactions(angle: float, speed: float = 10.0) -> dict[str, np.ndarray]:
     e = b + 2.5 * np.array([math.cos(turn), math.sin(turn)])
     work = np.array([0.0, -1000.0])
 
-    def moment(arm: np.ndarray, force: np.ndarray) -> float:
+    def moment(arm, force):
         return float(arm[0] * force[1] - arm[1] * force[0])
 
     # unknowns: F_B on the coupler, F_C on the rocker by the coupler, F_D on the rocker
@@ -147,7 +142,7 @@ def reactions(angle: float, speed: float = 10.0) -> dict[str, np.ndarray]:
 
 @pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("degrees", [0, 36, 72, 144, 252, 324])
-def test_forces_of_the_drawing_are_those_of_the_papers_equations(degrees: int, tmp_path: Path) -> None:
+def test_forces_of_the_drawing_are_those_of_the_papers_equations(degrees, tmp_path):
     export_model(durango("off"), tmp_path / "out.dxf", f"{degrees}deg")
     drawn = {name: force for polygon in forces(tmp_path / "out.dxf").values() for name, force in polygon.items()}
     expected = reactions(math.radians(degrees))
@@ -159,7 +154,7 @@ def test_forces_of_the_drawing_are_those_of_the_papers_equations(degrees: int, t
 
 @pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("degrees", range(0, 360, 36))
-def test_three_rounds_of_approximation_end_at_the_settled_polygon(degrees: int, tmp_path: Path) -> None:
+def test_three_rounds_of_approximation_end_at_the_settled_polygon(degrees, tmp_path):
     """[D], graphical validation: three iterations differ by less than 0.1 % at ten positions of the crank."""
     export_model(durango("on"), tmp_path / "out.dxf", f"{degrees}deg")
     drawn = lines(tmp_path / "out.dxf")
@@ -171,7 +166,7 @@ def test_three_rounds_of_approximation_end_at_the_settled_polygon(degrees: int, 
     assert np.abs(last - settled).max() < 1e-2 * np.abs(bare - settled).max()
 
 
-def test_curves_of_points_are_drawn_over_the_cycle(tmp_path: Path) -> None:
+def test_curves_of_points_are_drawn_over_the_cycle(tmp_path):
     export_model(trunnion.read(DURANGO), tmp_path / "out.dxf")
     space = ezdxf.readfile(tmp_path / "out.dxf").modelspace()
     curves = {curve.dxf.layer: curve for curve in space.query("POLYLINE")}

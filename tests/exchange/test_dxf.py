@@ -1,10 +1,6 @@
 """DXF in: drawings made by ezdxf as a draughtsman would, read as links and joints; and what is asked or refused."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
-from typing import Any
 
 import ezdxf
 import numpy as np
@@ -14,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
-from trunnion.exchange import Draft, import_file, model_text
+from trunnion.exchange import import_file, model_text
 
 A, B, C, D, E = (0.0, 0.0), (30.0, 40.0), (150.0, 90.0), (120.0, 0.0), (80.0, 110.0)
 PIN, HOLE = 5.0, 5.05
@@ -22,7 +18,7 @@ BOX = ("box", (85, -8), (115, -8), (115, 8), (85, 8))
 FOUR_BAR = {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("ground", "rocker")}
 
 
-def drawing(units: int = 4, **layers: list[tuple[Any, ...]]) -> Any:
+def drawing(units=4, **layers):
     """A drawing of layers with ("line", a, b), ("circle", c, r), ("point", p), ("text", p, name), ("slot", a, b, r)."""
     document = ezdxf.new("R2010", units=units)
     for layer, marks in layers.items():
@@ -30,7 +26,7 @@ def drawing(units: int = 4, **layers: list[tuple[Any, ...]]) -> Any:
     return document
 
 
-def draw(space: Any, layer: str, marks: list[tuple[Any, ...]]) -> None:
+def draw(space, layer, marks):
     here = {"layer": {"zero": "0"}.get(layer, layer)}
     for kind, *numbers in marks:
         if kind == "line":
@@ -50,7 +46,7 @@ def draw(space: Any, layer: str, marks: list[tuple[Any, ...]]) -> None:
             space.add_lwpolyline(corners, format="xyb", close=True, dxfattribs=here)
 
 
-def four_bar() -> dict[str, list[tuple[Any, ...]]]:
+def four_bar():
     return {
         "ground": [("circle", A, PIN), ("circle", D, PIN), ("line", A, D)],
         "crank": [("circle", A, HOLE), ("circle", B, PIN), ("line", A, B), ("text", (1, 1), "A")],
@@ -61,17 +57,17 @@ def four_bar() -> dict[str, list[tuple[Any, ...]]]:
     }  # fmt: skip
 
 
-def read(document: Any, folder: Path, **options: Any) -> Draft:
+def read(document, folder, **options):
     path = folder / "drawing.dxf"
     document.saveas(path)
     return import_file(path, **options)
 
 
-def codes(draft: Draft) -> list[str]:
+def codes(draft):
     return sorted(finding.code.removeprefix("exchange.") for finding in draft.findings)
 
 
-def test_concentric_circles_of_two_layers_are_a_joint_with_pin_hole_and_name(tmp_path: Path) -> None:
+def test_concentric_circles_of_two_layers_are_a_joint_with_pin_hole_and_name(tmp_path):
     draft = read(drawing(**four_bar()), tmp_path)
     assert {name: pair.links for name, pair in draft.pairs.items()} == FOUR_BAR
     for name, place in zip("ABCD", (A, B, C, D), strict=True):
@@ -96,9 +92,7 @@ def test_concentric_circles_of_two_layers_are_a_joint_with_pin_hole_and_name(tmp
     mirrored=st.booleans(),
     nested=st.integers(0, 3),
 )
-def test_blocks_are_read_where_they_are_inserted(
-    turn: float, shift: float, scale: float, mirrored: bool, nested: int, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_blocks_are_read_where_they_are_inserted(turn, shift, scale, mirrored, nested, tmp_path_factory):
     document = ezdxf.new("R2010", units=4)
     block = document.blocks.new("part0")
     for layer, marks in four_bar().items():
@@ -122,7 +116,7 @@ def test_blocks_are_read_where_they_are_inserted(
         assert pair.hole_radius == pytest.approx(5.05e-3 * scale, rel=1e-9)
 
 
-def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path: Path) -> None:
+def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path):
     inches = read(drawing(units=1, **four_bar()), tmp_path)
     np.testing.assert_allclose(inches.pairs["D"].at, [120 * 0.0254, 0, 0], rtol=1e-15)
     bare = read(drawing(units=0, **four_bar()), tmp_path)
@@ -133,7 +127,7 @@ def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path: Path) -
 
 
 ON_GROUND = [("circle", A, PIN), ("line", (0, -40), (100, -40))]
-CIRCLES: list[tuple[dict[str, list[tuple[Any, ...]]], str, list[tuple[str, ...]], list[float | None]]] = [
+CIRCLES = [
     # marks by layer, what is said, links of the joints and radii of their pins
     ({layer: [mark for mark in marks if mark[0] == "line"] for layer, marks in four_bar().items()},
      "bare_end", [*FOUR_BAR.values()], [None] * 4),
@@ -148,16 +142,14 @@ CIRCLES: list[tuple[dict[str, list[tuple[Any, ...]]], str, list[tuple[str, ...]]
 
 
 @pytest.mark.parametrize(("marks", "says", "joints", "radii"), CIRCLES)
-def test_what_is_not_clearly_pin_and_hole_is_asked(
-    marks: dict[str, Any], says: str, joints: list[tuple[str, ...]], radii: list[float | None], tmp_path: Path
-) -> None:
+def test_what_is_not_clearly_pin_and_hole_is_asked(marks, says, joints, radii, tmp_path):
     draft = read(drawing(**marks), tmp_path)
     assert says in codes(draft) or any(what.startswith(says) for what in draft.lost)
     assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(links) for links in joints}
     assert [pair.pin_radius for pair in draft.pairs.values()] == [radius and pytest.approx(radius) for radius in radii]
 
 
-def slotted() -> dict[str, list[tuple[Any, ...]]]:
+def slotted():
     """A crank of 40 mm whose pin runs in the slot of a lever 100 mm away, drawn at 90°."""
     way = np.array([100.0, 40.0]) / math.hypot(100, 40)
     lever = np.array([-100.0, 0.0])
@@ -168,7 +160,7 @@ def slotted() -> dict[str, list[tuple[Any, ...]]]:
     }
 
 
-def test_a_pin_in_a_slot_turns_and_slides(tmp_path: Path) -> None:
+def test_a_pin_in_a_slot_turns_and_slides(tmp_path):
     draft = read(drawing(**slotted()), tmp_path, drive="J1", speed="10 rad/s")
     kinds = sorted((pair.type, *pair.links) for pair in draft.pairs.values())
     block = "block in lever"
@@ -186,14 +178,14 @@ def test_a_pin_in_a_slot_turns_and_slides(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("pin", [(0.0, 40.0), (1.0, 40.0), (0.0, 39.0), (-100.0, 100.0)])
-def test_a_pin_beside_the_middle_of_a_slot_is_no_guide(pin: tuple[float, float], tmp_path: Path) -> None:
+def test_a_pin_beside_the_middle_of_a_slot_is_no_guide(pin, tmp_path):
     marks = slotted()
     marks["crank"][-1] = ("circle", pin, 6.0)
     types = [pair.type for pair in read(drawing(**marks), tmp_path).pairs.values()]
     assert ("prismatic" in types) == (pin == (0.0, 40.0))
 
 
-def slider(rail: list[tuple[Any, ...]], block: list[tuple[Any, ...]]) -> dict[str, list[tuple[Any, ...]]]:
+def slider(rail, block):
     return {
         "ground": [("circle", A, PIN), *rail],
         "crank": [("circle", A, PIN), ("line", A, (0, 30)), ("circle", (0, 30), PIN)],
@@ -211,7 +203,7 @@ def slider(rail: list[tuple[Any, ...]], block: list[tuple[Any, ...]]) -> dict[st
         ([("slot", (40, 0), (160, 0), 8)], [BOX]),
     ],
 )
-def test_lines_that_lie_on_each_other_are_a_guide(rail: list[Any], block: list[Any], tmp_path: Path) -> None:
+def test_lines_that_lie_on_each_other_are_a_guide(rail, block, tmp_path):
     draft = read(drawing(**slider(rail, block)), tmp_path)
     (guide,) = (pair for pair in draft.pairs.values() if pair.type == "prismatic")
     assert guide.links == ("ground", "slider")
@@ -222,7 +214,7 @@ def test_lines_that_lie_on_each_other_are_a_guide(rail: list[Any], block: list[A
     assert draft.mobility(planar=True) == 1
 
 
-def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path: Path) -> None:
+def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path):
     document = drawing(**four_bar(), notes=[("circle", A, PIN)], Defpoints=[("point", B)])
     document.layers.add("notes").off()
     space = document.modelspace()
@@ -236,7 +228,7 @@ def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path: Path) ->
     assert "hidden layer notes" in left
 
 
-def test_a_drawing_in_space_is_read_flat_with_a_warning(tmp_path: Path) -> None:
+def test_a_drawing_in_space_is_read_flat_with_a_warning(tmp_path):
     document = drawing(**four_bar())
     for circle in document.modelspace().query('CIRCLE[layer=="crank"]'):
         circle.translate(0, 0, 7)
@@ -245,7 +237,7 @@ def test_a_drawing_in_space_is_read_flat_with_a_warning(tmp_path: Path) -> None:
     assert set(draft.pairs) == set(FOUR_BAR)
 
 
-def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path: Path) -> None:
+def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path):
     document = drawing(ground=[("circle", A, PIN)])
     draw(document.blocks.new("arm"), "zero", [("circle", A, HOLE), ("circle", (50, 0), PIN)])
     document.modelspace().add_blockref("arm", (0, 0), dxfattribs={"layer": "arm"})

@@ -1,11 +1,8 @@
 """The motion in time as a unit for co-simulation: what it gives is what `simulate` gives."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -43,14 +40,14 @@ assembly: {B: [150 mm, 140 mm]}
 
 
 @pytest.fixture(scope="module")
-def four_bar(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
+def four_bar(tmp_path_factory):
     path = tmp_path_factory.mktemp("fmu") / "model.yaml"
     path.write_text(MODEL, encoding="utf-8")
     return read_mechanism(path)
 
 
 @pytest.fixture(scope="module")
-def unit(four_bar: Mechanism, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def unit(four_bar, tmp_path_factory):
     """The class that runs in the unit, over a folder with the model."""
     from trunnion.exchange.fmu import MODEL as NAME
     from trunnion.exchange.fmu import Linkage
@@ -60,7 +57,7 @@ def unit(four_bar: Mechanism, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return SimpleNamespace(make=lambda: Linkage(instance_name="one", resources=str(folder)), folder=folder)
 
 
-def run(unit: Any, times: np.ndarray, inputs: Any = None, **parameters: float) -> dict[str, np.ndarray]:
+def run(unit, times, inputs=None, **parameters):
     """Outputs at times, stepped by hand. inputs: by the time at which a step begins."""
     slave, rows = unit.make(), []
     slave.setup_experiment(0.0)
@@ -75,7 +72,7 @@ def run(unit: Any, times: np.ndarray, inputs: Any = None, **parameters: float) -
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def agrees(found: dict[str, np.ndarray], wanted: Any, rows: slice = slice(None), within: float = 1e-6) -> None:
+def agrees(found, wanted, rows=slice(None), within=1e-6):
     """Coordinate, rate and reactions are those of `simulate`."""
     close(found["O.coordinate"][rows], wanted["drive_coordinate"].values[0][rows], within)
     close(found["O.rate"][rows], wanted["drive_rate"].values[0][rows], within)
@@ -88,7 +85,7 @@ def agrees(found: dict[str, np.ndarray], wanted: Any, rows: slice = slice(None),
 ROUNDING = 1e-12  # N or N m: of a force that is 0 in the press nothing else is left
 
 
-def close(found: np.ndarray, wanted: np.ndarray, within: float) -> None:
+def close(found, wanted, within):
     assert np.max(np.abs(found - wanted)) <= within * np.max(np.abs(wanted)) + ROUNDING
 
 
@@ -100,9 +97,7 @@ def close(found: np.ndarray, wanted: np.ndarray, within: float) -> None:
         pytest.param("andrews-squeezer-in-time", 0.03, marks=pytest.mark.slow),
     ],
 )
-def test_a_unit_passes_its_validation_and_gives_what_simulate_gives(
-    name: str, duration: float, four_bar: Mechanism, tmp_path: Path
-) -> None:
+def test_a_unit_passes_its_validation_and_gives_what_simulate_gives(name, duration, four_bar, tmp_path):
     from fmpy.validation import validate_fmu
 
     mechanism = read_mechanism(EXAMPLES / f"{name}.yaml") if name else four_bar
@@ -120,7 +115,7 @@ def test_a_unit_passes_its_validation_and_gives_what_simulate_gives(
         close(found["O.effort"][1:], wanted["drive_effort"].values[0][1:], 1e-6)
 
 
-def test_steps_of_any_length_give_the_motion_of_simulate(unit: Any, four_bar: Mechanism) -> None:
+def test_steps_of_any_length_give_the_motion_of_simulate(unit, four_bar):
     wanted = simulate(four_bar, 0.3, 30)
     times = np.linspace(0.0, 0.3, 31)
     agrees(run(unit, times), wanted)
@@ -129,7 +124,7 @@ def test_steps_of_any_length_give_the_motion_of_simulate(unit: Any, four_bar: Me
     close(run(unit, uneven)["O.coordinate"], wanted["drive_coordinate"].values[0][rows], 1e-6)
 
 
-def test_an_effort_from_outside_acts_like_a_motor(unit: Any, four_bar: Mechanism) -> None:
+def test_an_effort_from_outside_acts_like_a_motor(unit, four_bar):
     data = four_bar.data()
     data["drivers"]["O"].pop("free")
     data["drivers"]["O"]["motor"] = {"kind": "constant", "effort": "0.8 N m", "off_from": "0.2 s"}
@@ -139,7 +134,7 @@ def test_an_effort_from_outside_acts_like_a_motor(unit: Any, four_bar: Mechanism
     agrees(found, wanted, np.flatnonzero(abs(times - 0.2) > 1e-9))  # there the effort jumps
 
 
-def test_loads_and_parameters_are_taken_over(unit: Any, four_bar: Mechanism) -> None:
+def test_loads_and_parameters_are_taken_over(unit, four_bar):
     changed = four_bar.with_values({"loads.pull.force.x": -2.0, "dimensions.r": 0.05, "drivers.O.initial.speed": 15.0})
     times = np.linspace(0.0, 0.3, 31)
     others = {"dimensions__r": 0.05, "drivers__O__initial__speed": 15.0}
@@ -147,7 +142,7 @@ def test_loads_and_parameters_are_taken_over(unit: Any, four_bar: Mechanism) -> 
     assert set(unit.make().parameters) == {"dimensions.r", "drivers.O.initial.speed"}  # not what follows from others
 
 
-def test_it_asks_for_the_end_where_the_motion_ends(unit: Any, four_bar: Mechanism, tmp_path: Path) -> None:
+def test_it_asks_for_the_end_where_the_motion_ends(unit, four_bar, tmp_path):
     from trunnion.exchange.fmu import Linkage
 
     data = four_bar.data()
@@ -163,7 +158,7 @@ def test_it_asks_for_the_end_where_the_motion_ends(unit: Any, four_bar: Mechanis
     assert slave.do_step(0.2, 0.05).status == 3
 
 
-def test_names_are_those_that_the_standard_allows(tmp_path: Path) -> None:
+def test_names_are_those_that_the_standard_allows(tmp_path):
     from fmpy.validation import validate_fmu
 
     (tmp_path / "odd.yaml").write_text(MODEL.replace("C: ", '"1 Gelenk-ö": '), encoding="utf-8")
@@ -175,7 +170,7 @@ def test_names_are_those_that_the_standard_allows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank-with-play"])
-def test_what_cannot_be_let_move_is_refused(name: str, four_bar: Mechanism, tmp_path: Path) -> None:
+def test_what_cannot_be_let_move_is_refused(name, four_bar, tmp_path):
     data = four_bar.data()
     if name == "four-bar":
         data["drivers"]["O"] = {"speed": "60 rpm"}
@@ -191,7 +186,7 @@ def test_what_cannot_be_let_move_is_refused(name: str, four_bar: Mechanism, tmp_
 
 
 @pytest.mark.slow
-def test_a_motion_goes_on_while_it_rests_and_sticks() -> None:
+def test_a_motion_goes_on_while_it_rests_and_sticks():
     mechanism = read_mechanism(EXAMPLES / "stick-slip-drive.yaml")
     wanted, motion = simulate(mechanism, 0.2, 4), Continued(mechanism)
     rows = [motion.advance(0.05 * k).at.q[0, 0] for k in range(1, 5)]

@@ -1,11 +1,7 @@
 """Assemblies of FreeCAD, written here as its Document.xml has them, at any placement and through any tree of parts."""
 
-from __future__ import annotations
-
 import math
 import zipfile
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from trunnion import analyse
-from trunnion.exchange import Draft, import_file, model_text
+from trunnion.exchange import import_file, model_text
 from trunnion.model.mechanism import read_mechanism
 
 KINDS = ["Fixed", "Revolute", "Cylindrical", "Slider", "Ball", "Distance", "Parallel", "Perpendicular", "Angle",
@@ -22,12 +18,12 @@ KINDS = ["Fixed", "Revolute", "Cylindrical", "Slider", "Ball", "Distance", "Para
 UP = Rotation.identity()
 
 
-def turned(axis: Any, angle: float) -> Rotation:
+def turned(axis, angle):
     """The rotation about an axis."""
     return Rotation.from_rotvec(angle * np.asarray(axis, float) / np.linalg.norm(axis))
 
 
-def matrix(place: Any, rotation: Rotation) -> np.ndarray:
+def matrix(place, rotation):
     """The frame of a placement."""
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = rotation.as_matrix(), place
@@ -37,21 +33,21 @@ def matrix(place: Any, rotation: Rotation) -> np.ndarray:
 class Drawing:
     """A document: objects with properties, as FreeCAD writes them."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.objects: list[tuple[str, str, str]] = []
 
-    def add(self, kind: str, name: str, **properties: str) -> str:
+    def add(self, kind, name, **properties):
         rows = "".join(f'<Property name="{key}" type="x">{text}</Property>' for key, text in properties.items())
         self.objects.append((kind, name, f'<Properties Count="{len(properties)}">{rows}</Properties>'))
         return name
 
-    def text(self) -> str:
+    def text(self):
         types = "".join(f'<Object type="{kind}" name="{name}" id="1"/>' for kind, name, _ in self.objects)
         data = "".join(f'<Object name="{name}">{rows}</Object>' for _, name, rows in self.objects)
         head = '<?xml version="1.0" encoding="utf-8"?><Document SchemaVersion="4" ProgramVersion="1.0.0">'
         return f"{head}<Objects>{types}</Objects><ObjectData>{data}</ObjectData></Document>"
 
-    def save(self, path: Path) -> Path:
+    def save(self, path):
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("Document.xml", self.text())
             archive.writestr("GuiDocument.xml", "<Document/>")
@@ -59,19 +55,19 @@ class Drawing:
         return path
 
 
-def string(value: str) -> str:
+def string(value):
     return f'<String value="{value}"/>'
 
 
-def boolean(value: bool) -> str:
+def boolean(value):
     return f'<Bool value="{str(value).lower()}"/>'
 
 
-def number(value: float) -> str:
+def number(value):
     return f'<Float value="{value!r}"/>'
 
 
-def placed(frame: np.ndarray) -> str:
+def placed(frame):
     """A placement, with the quaternion as FreeCAD has it, the scalar last."""
     keys = ("Px", "Py", "Pz", "Q0", "Q1", "Q2", "Q3")
     numbers = [*frame[:3, 3], *Rotation.from_matrix(frame[:3, :3]).as_quat()]
@@ -79,21 +75,21 @@ def placed(frame: np.ndarray) -> str:
     return f"<PropertyPlacement {' '.join(attributes)}/>"
 
 
-def grouped(*names: str) -> str:
+def grouped(*names):
     return f'<LinkList count="{len(names)}">{"".join(f"""<Link value="{name}"/>""" for name in names)}</LinkList>'
 
 
-def linked(name: str, *subs: str, file: str = "") -> str:
+def linked(name, *subs, file=""):
     inner = "".join(f'<Sub value="{sub}"/>' for sub in subs)
     return f'<XLink file="{file}" stamp="" name="{name}" count="{len(subs)}">{inner}</XLink>'
 
 
-def kinds(kind: str) -> str:
+def kinds(kind):
     listed = "".join(f'<Enum value="{one}"/>' for one in KINDS)
     return f'<Integer value="{KINDS.index(kind)}"/><CustomEnumList count="13">{listed}</CustomEnumList>'
 
 
-def joint(drawing: Drawing, name: str, kind: str, ends: Any, **more: str) -> str:
+def joint(drawing, name, kind, ends, **more):
     """A joint of two connectors: root, path and the frame in the last part."""
     properties = {"Label": string(name), "JointType": kinds(kind)}
     for which, (root, path, frame) in zip("12", ends, strict=True):
@@ -108,7 +104,7 @@ PINS["B"] = (60.0 + _x, math.sqrt(180.0**2 - _x**2), 6.0)
 BARS = {"O": ("Base", "Crank"), "A": ("Crank", "Rod"), "B": ("Rod", "Rocker"), "C": ("Base", "Rocker")}
 
 
-def four_bar(frame: np.ndarray, frames: dict[str, np.ndarray]) -> Drawing:
+def four_bar(frame, frames):
     """The four-bar turned as a whole by a frame, each part with a frame and a tree of its own, shapes in `frame`."""
     drawing, top = Drawing(), matrix((5.0, -3.0, 2.0), turned((1, 2, 3), 0.7))
     inner = matrix((1.0, 2.0, 3.0), turned((3, -1, 2), 1.1))
@@ -160,7 +156,7 @@ def four_bar(frame: np.ndarray, frames: dict[str, np.ndarray]) -> Drawing:
 ALIKE = dict.fromkeys(("Base", "Crank", "Rod", "Rocker"), np.eye(4))
 
 
-def codes(draft: Draft) -> list[str]:
+def codes(draft):
     return [finding.code.removeprefix("exchange.") for finding in draft.findings]
 
 
@@ -174,7 +170,7 @@ frames = st.builds(
 
 @settings(max_examples=25, deadline=None)
 @given(whole=frames, own=st.tuples(frames, frames, frames, frames))
-def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory: Any, whole: np.ndarray, own: Any) -> None:
+def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory, whole, own):
     drawing = four_bar(whole, dict(zip(ALIKE, own, strict=True)))
     draft = import_file(drawing.save(tmp_path_factory.mktemp("fc") / "one.FCStd"))
     assert draft.ground == "Base"
@@ -188,7 +184,7 @@ def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory: Any, whol
         np.testing.assert_allclose(pair.axis, whole[:3, 2], atol=1e-12)
 
 
-def test_the_model_moves_like_one_written_by_hand(tmp_path: Path) -> None:
+def test_the_model_moves_like_one_written_by_hand(tmp_path):
     whole = matrix((100.0, 20.0, -40.0), turned((1, 1, 1), 2 * math.pi / 3))
     draft = import_file(four_bar(whole, dict.fromkeys(ALIKE, whole)).save(tmp_path / "a.fcstd"))
     (tmp_path / "model.yaml").write_text(model_text(draft), encoding="utf-8")
@@ -202,7 +198,7 @@ def test_the_model_moves_like_one_written_by_hand(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(np.unwrap(turns)), np.diff(np.unwrap(rocker)), atol=1e-9)
 
 
-def pair_of(kind: str, second: np.ndarray, tmp_path: Path, **more: str) -> Draft:
+def pair_of(kind, second, tmp_path, **more):
     """Two bodies with one joint, the second connector at a frame in that of the first; a pin joins them to a third."""
     drawing = Drawing()
     for name in ("Base", "Slide", "Arm"):
@@ -217,7 +213,7 @@ def pair_of(kind: str, second: np.ndarray, tmp_path: Path, **more: str) -> Draft
     return import_file(drawing.save(tmp_path / "two.FCStd"))
 
 
-def test_kinds_of_joints_and_their_limits(tmp_path: Path) -> None:
+def test_kinds_of_joints_and_their_limits(tmp_path):
     ends = {"LengthMin": number(-5.0), "LengthMax": number(20.0), "AngleMin": number(-30.0), "AngleMax": number(90.0)}
     ends |= {f"Enable{key}": boolean(True) for key in ends}
     along, round_ = matrix((0, 0, 8.0), UP), matrix((0, 0, 0), turned((0, 0, 1), math.radians(10)))
@@ -234,7 +230,7 @@ def test_kinds_of_joints_and_their_limits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS[5:])
-def test_what_is_no_pair_is_said(kind: str, tmp_path: Path) -> None:
+def test_what_is_no_pair_is_said(kind, tmp_path):
     draft = pair_of(kind, np.eye(4), tmp_path)
     assert set(draft.pairs) == {"P"}
     (lost,) = [finding for finding in draft.findings if finding.code == "exchange.lost"]

@@ -1,7 +1,5 @@
 """Files that are damaged, or made to harm: each is read or refused in a sentence, soon, whatever its format."""
 
-from __future__ import annotations
-
 import json
 import logging
 import random
@@ -9,8 +7,6 @@ import re
 import struct
 import time
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
 from xml.etree import ElementTree
 
 import ezdxf
@@ -35,11 +31,11 @@ logging.getLogger("ezdxf").disabled = True  # it quotes damaged text, which xdis
 BOXED, ITEM = solid(1, BOX * CORNERS, FACES), '<item objectid="1"/>'
 
 
-def saved(document: ezdxf.document.Drawing, path: Path) -> None:
+def saved(document, path):
     document.saveas(path)
 
 
-SOUND: dict[str, Callable[[Path], object]] = {  # writes a file that is read
+SOUND = {  # writes a file that is read
     ".step": lambda path: step(path, slider_crank()),
     ".dxf": lambda path: saved(drawing(**drawn()), path),
     ".mjcf": lambda path: path.write_text(MJCF),
@@ -54,13 +50,13 @@ SOUND: dict[str, Callable[[Path], object]] = {  # writes a file that is read
 }
 
 
-def sound(suffix: str, folder: Path) -> Path:
+def sound(suffix, folder):
     path = folder / f"sound{suffix}"
     SOUND[suffix](path)
     return path
 
 
-def refusal(path: Path) -> str:
+def refusal(path):
     """Why a file is not read; empty if it is."""
     try:
         model_text(import_file(path))
@@ -82,9 +78,7 @@ def refusal(path: Path) -> str:
         max_size=4,
     ),
 )
-def test_damage_anywhere_is_no_traceback(
-    suffix: str, damage: list[tuple[float, bytes, int]], tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_damage_anywhere_is_no_traceback(suffix, damage, tmp_path_factory):
     path = sound(suffix, tmp_path_factory.mktemp("damage"))
     data = path.read_bytes()
     for share, inserted, lost in damage:
@@ -99,9 +93,7 @@ VALUES = ("", "0", "-1", "nan", "1e308", "x", "0 0 0", "1 2 3", "world", "A", "c
 
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**31 - 1), suffix=st.sampled_from([".mjcf", ".sdf", ".old.sdf", ".urdf"]))
-def test_other_values_in_xml_say_what_is_wrong(
-    seed: int, suffix: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_other_values_in_xml_say_what_is_wrong(seed, suffix, tmp_path_factory):
     path = sound(suffix, tmp_path_factory.mktemp("values"))
     choose, root = random.Random(seed), ElementTree.fromstring(path.read_bytes())
     for _ in range(choose.randint(1, 3)):
@@ -121,12 +113,12 @@ def test_other_values_in_xml_say_what_is_wrong(
     assert "as its format has it" not in refusal(path)  # but in words of the reader, which parses it by itself
 
 
-def points(count: int, x: bytes = b"1.0") -> bytes:
+def points(count, x=b"1.0"):
     marks = b"  0\nPOINT\n  8\na\n 10\n" + x + b"\n 20\n2.0\n"
     return b"  0\nSECTION\n  2\nENTITIES\n" + marks * count + b"  0\nENDSEC\n  0\nEOF\n"
 
 
-def blocks(path: Path, count: int, **attributes: int) -> None:
+def blocks(path, count, **attributes):
     """A block in blocks: ten of each in the next, or in itself if the count is below 0."""
     document = ezdxf.new("R2010")
     document.blocks.new("b0").add_circle((0, 0), 1)
@@ -138,18 +130,18 @@ def blocks(path: Path, count: int, **attributes: int) -> None:
     document.saveas(path)
 
 
-def zipped(path: Path, text: str | bytes, name: str) -> None:
+def zipped(path, text, name):
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr(name, text)
 
 
-def lying(path: Path) -> None:
+def lying(path):
     """A zip that says its model is small, and unpacks to 60 MB."""
     zipped(path, b"<model>" + b" " * 60_000_000 + b"</model>", "3D/3dmodel.model")
     path.write_bytes(path.read_bytes().replace(struct.pack("<I", 60_000_015), struct.pack("<I", 1000)))
 
 
-def nested(count: int) -> str:
+def nested(count):
     """Objects each of ten of the one before."""
     parts = [BOXED]
     for number in range(2, count + 2):
@@ -158,11 +150,11 @@ def nested(count: int) -> str:
     return "".join(parts)
 
 
-def of_step(change: Callable[[str], str]) -> Callable[[Path], object]:
+def of_step(change):
     return lambda path: path.write_text(change(step(path, slider_crank()).read_text()))
 
 
-def of_3mf(objects: str = BOXED, build: str = ITEM, unit: str = "millimeter", head: str = "") -> Callable[[Path], None]:
+def of_3mf(objects=BOXED, build=ITEM, unit="millimeter", head=""):
     return lambda path: zipped(path, model_3mf(objects, build, unit, head), "3D/3dmodel.model")
 
 
@@ -180,7 +172,7 @@ TRIANGLE = json.dumps({
 }).ljust(660).encode()  # fmt: skip
 COMPONENT = '<object id="1"><components><component objectid="1"/></components></object>'
 PART = '<D><Objects><Object type="App::Part" name="A"/></Objects><ObjectData><Object name="A"/></ObjectData></D>'
-HOSTILE: dict[str, dict[str, bytes | str | Callable[[Path], object]]] = {
+HOSTILE = {
     ".step": {
         "many": HEAD + "".join(f"#{n}=CARTESIAN_POINT('',(0.,0.,{n}.));\n" for n in range(1, 10**6)) + "ENDSEC;\n",
         "junk with a head": b"ISO-10303-21;" + bytes(range(256)) * 40 + b"ENDSEC;",
@@ -268,7 +260,7 @@ for kinds in HOSTILE.values():
 @pytest.mark.sample(15)
 @pytest.mark.spread(5)
 @pytest.mark.parametrize(("suffix", "kind"), [(suffix, kind) for suffix, kinds in HOSTILE.items() for kind in kinds])
-def test_a_hostile_file_is_one_sentence(suffix: str, kind: str, tmp_path: Path) -> None:
+def test_a_hostile_file_is_one_sentence(suffix, kind, tmp_path):
     path, data = tmp_path / f"hostile{suffix}", HOSTILE[suffix][kind]
     if callable(data):
         data(path)

@@ -3,20 +3,16 @@
 Links of PMKS+ are of its public library of templates (MIT), files of pylinkage were written by its release 1.3.0.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import time
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from trunnion import Mechanism, analyse
+from trunnion import analyse
 from trunnion.errors import MechanismError
-from trunnion.exchange import Draft, import_file, model_text
+from trunnion.exchange import import_file, model_text
 from trunnion.model.mechanism import read_mechanism
 
 SITE = "https://app.pmksplus.com/?"
@@ -74,28 +70,28 @@ SLIDER = {
 }
 
 
-def model(draft: Draft, tmp_path: Path) -> Mechanism:
+def model(draft, tmp_path):
     (tmp_path / "model.yaml").write_text(model_text(draft), encoding="utf-8")
     return read_mechanism(tmp_path / "model.yaml")
 
 
-def written(data: Any, tmp_path: Path, name: str = "linkage.json") -> Path:
+def written(data, tmp_path, name="linkage.json"):
     text = data if isinstance(data, str) else json.dumps(data)
     (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path / name
 
 
-def codes(draft: Draft) -> list[str]:
+def codes(draft):
     return [finding.code.removeprefix("exchange.") for finding in draft.findings]
 
 
 @pytest.mark.parametrize("name", PMKS)
-def test_every_template_runs_for_its_whole_cycle(name: str, tmp_path: Path) -> None:
+def test_every_template_runs_for_its_whole_cycle(name, tmp_path):
     mechanism = model(import_file(SITE + PMKS[name]), tmp_path)
     assert np.all(analyse(mechanism, 72)["status"].values == 0)
 
 
-def test_a_saved_file_and_a_shortcut_are_the_link(tmp_path: Path) -> None:
+def test_a_saved_file_and_a_shortcut_are_the_link(tmp_path):
     wanted = model_text(import_file(SITE + PMKS["four-bar"])).splitlines()[3:]
     shortcut = f"[InternetShortcut]\nURL={SITE}{PMKS['four-bar']}\n"
     for name, text in (
@@ -106,7 +102,7 @@ def test_a_saved_file_and_a_shortcut_are_the_link(tmp_path: Path) -> None:
         assert model_text(import_file(written(text, tmp_path, name))).splitlines()[3:] == wanted
 
 
-def test_places_masses_and_speed_are_in_their_units() -> None:
+def test_places_masses_and_speed_are_in_their_units():
     """By hand: -0mv is −(48·64 + 57) thousandths of a cm."""
     draft = import_file(SITE + PMKS["four-bar"])
     assert draft.pairs["A"].at == pytest.approx([-(48 * 64 + 57) * 1e-5, -(31 * 64 + 30) * 1e-5, 0.0], rel=1e-12)
@@ -118,7 +114,7 @@ def test_places_masses_and_speed_are_in_their_units() -> None:
     assert codes(draft) == ["unit"]
 
 
-def test_jansens_leg_has_the_lengths_that_he_states() -> None:
+def test_jansens_leg_has_the_lengths_that_he_states():
     draft = import_file(SITE + PMKS["jansen"])
     places = {name: pair.at for name, pair in draft.pairs.items()} | {"F": draft.bodies["DEF"].points["F"]}
     lengths = {"OA": 15.0, "AB": 50.0, "GB": 41.5, "BC": 55.8, "GC": 40.1, "AD": 61.9, "GD": 39.3, "CE": 39.4,
@@ -127,7 +123,7 @@ def test_jansens_leg_has_the_lengths_that_he_states() -> None:
         assert np.linalg.norm(places[second] - places[first]) == pytest.approx(length * 1e-2, abs=2e-5)
 
 
-def test_the_ram_of_the_shaper_is_where_its_proportions_have_it(tmp_path: Path) -> None:
+def test_the_ram_of_the_shaper_is_where_its_proportions_have_it(tmp_path):
     """Crank 1, 3 above the pivot of a lever of 5, a rod of 2.5 to a ram 3.5 above the crank; in cm."""
     mechanism = model(import_file(SITE + PMKS["shaper"]), tmp_path)
     result = analyse(mechanism, 360, variables=["point_position", "joint_rotation"])
@@ -139,7 +135,7 @@ def test_the_ram_of_the_shaper_is_where_its_proportions_have_it(tmp_path: Path) 
     np.testing.assert_allclose(place[1], 0.035, atol=1e-12)
 
 
-def check(text: str) -> str:
+def check(text):
     """The signs at the end of a link, as its site makes them."""
     signs = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
     text += signs[len(text) % 62]
@@ -150,7 +146,7 @@ def check(text: str) -> str:
     return f"{text}*{digest}"
 
 
-def test_newer_links_have_a_digest_corrections_and_one_joint_for_a_slider(tmp_path: Path) -> None:
+def test_newer_links_have_a_digest_corrections_and_one_joint_for_a_slider(tmp_path):
     text = "2P.Ay,1E8.K,0.2011.MA,A,0,0,0.GB,B,Fe,0,0.LC,C,_W,0,0..YRAB,AB,Fe,Fe,7q,0,c5cae9,A,B,,."
     text += "YRBC,BC,Fe,Fe,MG,0,303e9f,B,C,,...N_.PJB~0~1.23456789,PLBC~1~0.000125,PJC~4~0.5,PI~0~1.5"
     draft = import_file(SITE + check(text))
@@ -177,7 +173,7 @@ def test_newer_links_have_a_digest_corrections_and_one_joint_for_a_slider(tmp_pa
         (SITE + check(PMKS["four-bar"][:-1].replace("KD,D", "KC,D")), "is damaged"),
     ],
 )
-def test_bad_links_are_refused_in_a_sentence(text: str, says: str) -> None:
+def test_bad_links_are_refused_in_a_sentence(text, says):
     begin = time.perf_counter()
     with pytest.raises(MechanismError, match=says) as error:
         import_file(text)
@@ -185,7 +181,7 @@ def test_bad_links_are_refused_in_a_sentence(text: str, says: str) -> None:
     assert time.perf_counter() - begin < 60  # some 6 s where nothing else runs; it must not hang
 
 
-def test_a_mechanism_of_pylinkage_moves_as_it_does_there(tmp_path: Path) -> None:
+def test_a_mechanism_of_pylinkage_moves_as_it_does_there(tmp_path):
     draft = import_file(written(FOUR_BAR, tmp_path))
     assert draft.ground == "ground"
     assert list(draft.drives) == ["crank-motor_ground-A"]
@@ -196,13 +192,13 @@ def test_a_mechanism_of_pylinkage_moves_as_it_does_there(tmp_path: Path) -> None
     np.testing.assert_allclose(np.roll(place, -1, axis=0) * 1e3, PATH, atol=1e-9)
 
 
-def test_a_slider_of_pylinkage_is_a_pin_on_a_line(tmp_path: Path) -> None:
+def test_a_slider_of_pylinkage_is_a_pin_on_a_line(tmp_path):
     mechanism = model(import_file(written(SLIDER, tmp_path), unit="in"), tmp_path)
     place = analyse(mechanism, 4)["point_position"].sel(point="rod.B").values.T / 0.0254
     np.testing.assert_allclose(place[:, 0], [-60, -math.sqrt(7200), -120, -math.sqrt(7200)], atol=1e-9)
 
 
-def test_joints_without_a_place_of_their_own_or_too_many_are_refused(tmp_path: Path) -> None:
+def test_joints_without_a_place_of_their_own_or_too_many_are_refused(tmp_path):
     twice = {**FOUR_BAR, "joints": [*FOUR_BAR["joints"], FOUR_BAR["joints"][1]]}
     many = {"joints": [{"id": str(k), "type": "revolute", "position": [k, 0]} for k in range(100_000)], "links": []}
     for data, says in ((twice, "two joints of the same name"), (many, "at most 2,000")):

@@ -1,12 +1,9 @@
 """Meshes in closed form, written here byte by byte; GLB out, parsed byte by byte, with the poses of the analysis."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import trunnion
-from trunnion.exchange import Draft, export_model, import_file
+from trunnion.exchange import export_model, import_file
 from trunnion.exchange.draft import positions_of
-from trunnion.model.mechanism import Mechanism
 
 BOX = np.array([40.0, 20.0, 10.0])
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -28,7 +24,7 @@ FACES = np.array(
 )  # fmt: skip
 
 
-def stl(corners: Any, faces: Any, text: bool = False) -> bytes:
+def stl(corners, faces, text=False):
     triangles = np.asarray(corners)[np.asarray(faces)]
     if text:
         corner = "vertex {!r} {!r} {!r}\n"
@@ -38,7 +34,7 @@ def stl(corners: Any, faces: Any, text: bool = False) -> bytes:
     return b"\0" * 80 + struct.pack("<I", len(triangles)) + data
 
 
-def model_3mf(objects: str, build: str, unit: str | None = "millimeter", head: str = "") -> bytes:
+def model_3mf(objects, build, unit="millimeter", head=""):
     stated = "" if unit is None else f' unit="{unit}"'
     core = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
     return (
@@ -47,7 +43,7 @@ def model_3mf(objects: str, build: str, unit: str | None = "millimeter", head: s
     ).encode()
 
 
-def solid(number: int, corners: Any, faces: Any, name: str = "") -> str:
+def solid(number, corners, faces, name=""):
     vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in np.asarray(corners).tolist())
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in np.asarray(faces).tolist())
     label = f' name="{name}"' if name else ""
@@ -55,7 +51,7 @@ def solid(number: int, corners: Any, faces: Any, name: str = "") -> str:
     return f'<object id="{number}" type="model"{label}>{mesh}</object>'
 
 
-def packed(folder: Path, data: bytes, name: str = "3D/3dmodel.model") -> Path:
+def packed(folder, data, name="3D/3dmodel.model"):
     path = folder / "part.3mf"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("[Content_Types].xml", "<Types/>")
@@ -63,16 +59,16 @@ def packed(folder: Path, data: bytes, name: str = "3D/3dmodel.model") -> Path:
     return path
 
 
-def written(folder: Path, data: bytes, name: str = "part.stl") -> Path:
+def written(folder, data, name="part.stl"):
     (folder / name).write_bytes(data)
     return folder / name
 
 
-def codes(draft: Draft) -> list[str]:
+def codes(draft):
     return sorted(finding.code.removeprefix("exchange.") for finding in draft.findings)
 
 
-def is_box(draft: Draft, name: str, sides: Any, rotation: Any, shift: Any, density: float = 7850.0) -> None:
+def is_box(draft, name, sides, rotation, shift, density=7850.0):
     """A box of these sides, m, whose corner lies at shift, m."""
     body = draft.bodies[name]
     mass = density * np.prod(sides)
@@ -85,7 +81,7 @@ def is_box(draft: Draft, name: str, sides: Any, rotation: Any, shift: Any, densi
 
 @pytest.mark.parametrize("text", [False, True])
 @pytest.mark.parametrize(("unit", "metre"), [("mm", 1e-3), ("in", 0.0254), ("m", 1.0)])
-def test_a_box_as_stl(text: bool, unit: str, metre: float, tmp_path: Path) -> None:
+def test_a_box_as_stl(text, unit, metre, tmp_path):
     draft = import_file(written(tmp_path, stl(BOX * CORNERS, FACES, text)), unit=unit, material="aluminium")
     is_box(draft, "part", metre * BOX, np.eye(3), np.zeros(3), 2700.0)
     assert codes(draft) == (["lost", "unit"] if unit == "mm" else ["lost"])  # stated, it is no guess
@@ -93,7 +89,7 @@ def test_a_box_as_stl(text: bool, unit: str, metre: float, tmp_path: Path) -> No
 
 @settings(deadline=None, max_examples=10)
 @given(seed=st.integers(0, 2**31 - 1), inside_out=st.booleans())
-def test_a_tetrahedron_anywhere(seed: int, inside_out: bool, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_tetrahedron_anywhere(seed, inside_out, tmp_path_factory):
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(4, 3)) * 50
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -111,10 +107,10 @@ def test_a_tetrahedron_anywhere(seed: int, inside_out: bool, tmp_path_factory: p
     np.testing.assert_allclose(body.inertia, np.trace(second) * np.eye(3) - second, atol=1e-9 * np.trace(second))
 
 
-def test_the_parts_of_a_3mf_lie_where_they_are_built(tmp_path: Path) -> None:
+def test_the_parts_of_a_3mf_lie_where_they_are_built(tmp_path):
     turn = Rotation.from_rotvec([0.3, -0.5, 0.7]).as_matrix()
 
-    def transform(rotation: Any, shift: Any) -> str:  # points are rows, so the matrix is written transposed
+    def transform(rotation, shift):  # points are rows, so the matrix is written transposed
         return " ".join(repr(float(n)) for n in [*rotation.T.ravel(), *shift])
 
     quarter = Rotation.from_rotvec([0, 0, np.pi / 2]).as_matrix()
@@ -134,13 +130,13 @@ def test_the_parts_of_a_3mf_lie_where_they_are_built(tmp_path: Path) -> None:
     [FACES[:-1], np.vstack([FACES[:-1], FACES[-1:, ::-1]]), np.vstack([FACES, [[0, 1, 7]]]), FACES[:2]],
     ids=["hole", "flipped", "fin", "sheet"],
 )
-def test_an_open_mesh_has_no_mass_and_says_so(faces: Any, tmp_path: Path) -> None:
+def test_an_open_mesh_has_no_mass_and_says_so(faces, tmp_path):
     draft = import_file(written(tmp_path, stl(BOX * CORNERS, faces)))
     assert draft.bodies["part"].mass == 0
     assert "open_mesh" in codes(draft)
 
 
-def test_a_cavity_is_subtracted(tmp_path: Path) -> None:
+def test_a_cavity_is_subtracted(tmp_path):
     corners = np.vstack([BOX * CORNERS, BOX * (0.25 + 0.5 * CORNERS)])
     draft = import_file(written(tmp_path, stl(corners, np.vstack([FACES, FACES[:, ::-1] + 8]))))
     assert draft.bodies["part"].mass == pytest.approx(7850 * np.prod(1e-3 * BOX) * 7 / 8, rel=1e-6)
@@ -152,7 +148,7 @@ PARTS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 class Glb:
     """The JSON of a GLB and its arrays."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path):
         data = path.read_bytes()
         magic, version, length = struct.unpack_from("<4sII", data)
         assert (magic, version, length) == (b"glTF", 2, len(data))
@@ -164,7 +160,7 @@ class Glb:
         assert 28 + size + binary == len(data)
         self.bytes = data[28 + size :]
 
-    def array(self, number: int) -> Any:
+    def array(self, number):
         accessor = self.json["accessors"][number]
         view = self.json["bufferViews"][accessor["bufferView"]]
         assert view["byteOffset"] % 4 == 0
@@ -177,10 +173,10 @@ class Glb:
             np.testing.assert_array_equal(array.max(axis=0), np.array(accessor["max"], kind))
         return array
 
-    def poses(self) -> dict[str, dict[str, Any]]:
+    def poses(self):
         """The keys of every moving node: time, translation, rotation."""
         (animation,) = self.json["animations"]
-        poses: dict[str, dict[str, Any]] = {}
+        poses = {}
         for channel in animation["channels"]:
             sampler = animation["samplers"][channel["sampler"]]
             node = self.json["nodes"][channel["target"]["node"]]["name"]
@@ -189,7 +185,7 @@ class Glb:
         return poses
 
 
-def example(name: str) -> Mechanism:
+def example(name):
     return trunnion.read(Path("examples") / f"{name}.yaml")
 
 
@@ -197,7 +193,7 @@ def example(name: str) -> Mechanism:
 @pytest.mark.parametrize(
     "name", ["durango-fourbar", "scotch-yoke", "jansen", "rssr", "double-cardan", "swash-plate-pump"]
 )
-def test_keys_are_the_poses_of_the_analysis(name: str, tmp_path: Path) -> None:
+def test_keys_are_the_poses_of_the_analysis(name, tmp_path):
     mechanism = example(name)
     export_model(mechanism, tmp_path / "out.glb", frames=40)
     glb, result = Glb(tmp_path / "out.glb"), trunnion.analyse(mechanism, 40)
@@ -224,7 +220,7 @@ def test_keys_are_the_poses_of_the_analysis(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(next(iter(poses.values()))["time"], times, atol=1e-6 * times[-1])
 
 
-def test_meshes_lie_where_the_joints_are_and_face_outwards(tmp_path: Path) -> None:
+def test_meshes_lie_where_the_joints_are_and_face_outwards(tmp_path):
     mechanism = example("durango-fourbar")
     export_model(mechanism, tmp_path / "out.glb", frames=12)
     glb = Glb(tmp_path / "out.glb")
@@ -244,7 +240,7 @@ def test_meshes_lie_where_the_joints_are_and_face_outwards(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_positions_without_a_solution_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_positions_without_a_solution_are_left_out_and_counted(tmp_path):
     mechanism = example("durango-fourbar").with_values({"AD": "7.5 m"})  # longest and shortest link are too long
     noted = export_model(mechanism, tmp_path / "out.glb", frames=36)
     (finding,) = (finding for finding in noted if finding.code == "exchange.unsolved")

@@ -1,13 +1,10 @@
 """MJCF, SDF and URDF: out and in again, against MuJoCo, and files as others write them."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,7 +22,7 @@ MOVING = [path.stem for path in EXAMPLES if path.stem not in APART and "\ngears:
 SUFFIXES = (".mjcf", ".sdf", ".urdf")
 
 
-def bare(name: str) -> Mechanism:
+def bare(name):
     """An example without what no robot format holds: friction, loads, springs, play, and laws of the drive."""
     mechanism = trunnion.read(Path("examples") / f"{name}.yaml").with_friction("off").with_seats("free")
     mechanism = mechanism.model_copy(update={"loads": {}, "springs": {}, "measures": {}})
@@ -39,7 +36,7 @@ def bare(name: str) -> Mechanism:
     return mechanism.model_copy(update={"drivers": {**mechanism.drivers, **drivers}})
 
 
-def imported(path: Path, gravity: np.ndarray | None = None, **options: str) -> Mechanism:
+def imported(path, gravity=None, **options):
     """The mechanism of a file, with a gravity if the format states none."""
     draft = import_file(path, **options)
     if gravity is not None:
@@ -49,13 +46,13 @@ def imported(path: Path, gravity: np.ndarray | None = None, **options: str) -> M
     return trunnion.read(model)
 
 
-def written(mechanism: Mechanism, path: Path) -> Mechanism:
+def written(mechanism, path):
     """A mechanism, written and read again."""
     export_model(mechanism, path)
     return imported(path, positions_of(mechanism, 4).draft().gravity if path.suffix == ".urdf" else None)
 
 
-def same_power(one: Mechanism, other: Mechanism, shares: tuple[float, ...] = (0.0, 0.17, 0.41, 0.83)) -> None:
+def same_power(one, other, shares=(0.0, 0.17, 0.41, 0.83)):
     """The drive power is the same at shares of the cycle where both can be assembled, which must be at two at least."""
     duration = min(float(trunnion.analyse(mechanism, 4)["time"].values[-1]) for mechanism in (one, other))
     powers = np.array([
@@ -70,7 +67,7 @@ def same_power(one: Mechanism, other: Mechanism, shares: tuple[float, ...] = (0.
 @pytest.mark.spread(5, "rssr-.mjcf", "slider-crank-.urdf", "universal-joint-.sdf")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("name", MOVING)
-def test_out_and_in_again_is_the_same_mechanism(name: str, suffix: str, tmp_path: Path) -> None:
+def test_out_and_in_again_is_the_same_mechanism(name, suffix, tmp_path):
     stated = bare(name)
     again = written(stated, tmp_path / f"again{suffix}")
     assert again.fixed_link == stated.fixed_link
@@ -100,7 +97,7 @@ def test_out_and_in_again_is_the_same_mechanism(name: str, suffix: str, tmp_path
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_screw_is_a_screw_again(suffix: str, tmp_path: Path) -> None:
+def test_a_screw_is_a_screw_again(suffix, tmp_path):
     up, aside = {"axis": [0, 0, 1]}, {"at": [0.1, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
     stated = Mechanism(
         name="jack", space="spatial", gravity=[0, 0, -9.81], ground="base", over_constraint="minimum-norm",
@@ -131,7 +128,7 @@ JOINTS = {  # type and direction of joints of a body in a row, and the axis of t
 
 
 @pytest.mark.parametrize("kind", JOINTS)
-def test_joints_of_one_body_are_the_pair_that_they_make(kind: str, tmp_path: Path) -> None:
+def test_joints_of_one_body_are_the_pair_that_they_make(kind, tmp_path):
     rows = [f'<joint name="j.{k}" type="{row[:5]}" axis="{row[6:]}"/>' for k, row in enumerate(JOINTS[kind][0])]
     body = f'<body name="a" pos="1 2 3">{"".join(rows)}<geom size="1"/></body>'
     (tmp_path / "joints.mjcf").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
@@ -148,7 +145,7 @@ def test_joints_of_one_body_are_the_pair_that_they_make(kind: str, tmp_path: Pat
 
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ["durango-fourbar", "slider-crank", "rssr", "double-cardan", "rccc", "jansen"])
-def test_inverse_dynamics_of_mujoco_agrees(name: str, tmp_path: Path) -> None:
+def test_inverse_dynamics_of_mujoco_agrees(name, tmp_path):
     """M(q) q̈ + c(q, q̇) of MuJoCo, projected on the velocity, is the drive torque; the loops are closed."""
     mujoco = pytest.importorskip("mujoco")
     stated = bare(name)
@@ -172,7 +169,7 @@ def test_inverse_dynamics_of_mujoco_agrees(name: str, tmp_path: Path) -> None:
         assert abs(closing @ velocity).max() < 1e-9 * abs(velocity).max()
 
 
-def generalised(mujoco, model, motion: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def generalised(mujoco, model, motion):
     """Velocities and accelerations of MuJoCo's joints; a ball's are in the axes of the outer body."""
     rates = np.zeros((2, model.nv))
     for number in range(model.njnt):
@@ -196,7 +193,7 @@ def generalised(mujoco, model, motion: xr.Dataset) -> tuple[np.ndarray, np.ndarr
     return rates[0], rates[1]
 
 
-def crossed(motion: xr.Dataset, model, number: int, key: str) -> float:
+def crossed(motion, model, number, key):
     """Rate of a hinge of a Cardan joint: of ω = a ȧ + b ḃ, and ω' = a ä + b b̈ + ω₁ × a ȧ + (ω₁ + a ȧ) × b ḃ."""
     first = number - (model.joint(number).name[-1] == "2")
     axes = np.array([model.jnt_axis[first], model.jnt_axis[first + 1]]).T
@@ -211,7 +208,7 @@ def crossed(motion: xr.Dataset, model, number: int, key: str) -> float:
     return float(rates[number - first])
 
 
-def closures(mujoco, model, data) -> np.ndarray:
+def closures(mujoco, model, data):
     """The Jacobian of all equalities: connect 3 rows, weld 6."""
     rows = []
     for number in range(model.neq):
@@ -229,7 +226,7 @@ def closures(mujoco, model, data) -> np.ndarray:
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "rssr", "double-cardan"])
-def test_the_tree_of_a_urdf_is_what_mujoco_reads(name: str, tmp_path: Path) -> None:
+def test_the_tree_of_a_urdf_is_what_mujoco_reads(name, tmp_path):
     mujoco = pytest.importorskip("mujoco")
     stated = bare(name)
     export_model(stated, tmp_path / "tree.urdf")
@@ -264,17 +261,17 @@ ORIENTATIONS = (
 SHAPES = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
 
 
-def row(values: np.ndarray) -> str:
+def row(values):
     return " ".join(repr(float(value)) for value in values)
 
 
-def placed(draw: np.random.Generator) -> str:
+def placed(draw):
     """Place and orientation of something, in one of the ways of MJCF."""
     turn = ORIENTATIONS[draw.integers(5)](draw)
     return f'pos="{row(draw.normal(size=3))}" {turn}'
 
 
-def shape(draw: np.random.Generator) -> str:
+def shape(draw):
     kind = SHAPES[draw.integers(5)]
     size = row(draw.uniform(0.01, 0.3, 3))
     place = placed(draw)
@@ -290,9 +287,7 @@ def shape(draw: np.random.Generator) -> str:
     order=st.sampled_from(["xyz", "zyx", "XYZ", "zxz", "ZYx"]),
     source=st.sampled_from(["auto", "true"]),
 )
-def test_any_frame_and_shape_is_where_mujoco_has_it(
-    seed: int, order: str, source: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_any_frame_and_shape_is_where_mujoco_has_it(seed, order, source, tmp_path_factory):
     mujoco = pytest.importorskip("mujoco")
     draw = np.random.default_rng(seed)
     axes = [row(draw.normal(size=3)) for _ in range(4)]
@@ -367,7 +362,7 @@ MJCF = f"""<mujoco model="four-bar"><compiler angle="degree" autolimits="true"/>
 <actuator><velocity joint="A" kv="5"/></actuator><keyframe><key ctrl="10"/></keyframe></mujoco>"""
 
 
-def link_sdf(name: str, pose: str, mass: float, centre: str, inertia: float) -> str:
+def link_sdf(name, pose, mass, centre, inertia):
     """A link whose inertial frame is turned about z, which changes nothing in the plane."""
     return f"""<link name="{name}">{pose}<inertial><pose>{centre} 0 0 0 0.3</pose><mass>{mass}</mass><inertia>
   <ixx>{inertia}</ixx><ixy>0</ixy><ixz>0</ixz><iyy>{inertia}</iyy><iyz>0</iyz><izz>{inertia}</izz></inertia></inertial>
@@ -409,7 +404,7 @@ OLD_SDF = f"""<sdf version="1.5"><world name="w"><gravity>0 0 -9.81</gravity>
 {DRIVE}</model></world></sdf>"""
 
 
-def link_urdf(name: str, mass: float, centre: str, inertia: float) -> str:
+def link_urdf(name, mass, centre, inertia):
     return f"""<link name="{name}"><inertial><origin xyz="{centre} 0" rpy="0 0 0.3"/><mass value="{mass}"/>
 <inertia ixx="{inertia}" ixy="0" ixz="0" iyy="{inertia}" iyz="0" izz="{inertia}"/></inertial></link>"""
 
@@ -437,7 +432,7 @@ URDF = f"""<robot name="four-bar"><material name="grey"/><link name="world"/>{li
     [(MJCF, "f.xml"), (SDF, "f.sdf"), (OLD_SDF, "f.sdf"), (URDF, "f.urdf")],
     ids=["mjcf", "sdf", "old-sdf", "urdf"],
 )
-def test_files_with_nested_frames_are_the_mechanism_written_by_hand(text: str, name: str, tmp_path: Path) -> None:
+def test_files_with_nested_frames_are_the_mechanism_written_by_hand(text, name, tmp_path):
     (tmp_path / name).write_text(text)
     reference = tmp_path / "reference.yaml"
     reference.write_text(REFERENCE)
@@ -459,7 +454,7 @@ def test_files_with_nested_frames_are_the_mechanism_written_by_hand(text: str, n
 # What is doubtful, lost or broken
 
 
-def finding_of(text: str, name: str, folder: Path) -> str:
+def finding_of(text, name, folder):
     """The one finding of a file that cannot be read."""
     path = folder / name
     path.write_text(text)
@@ -492,12 +487,12 @@ WHOLE = {"mjcf": MJCF, "sdf": SDF, "urdf": URDF}
         ("urdf", "<material", '<xacro:if xmlns:xacro="http://www.ros.org/wiki/xacro"/><material', "elements of xacro"),
     ],
 )
-def test_what_cannot_be_read_says_where(kind: str, old: str, new: str, sentence: str, tmp_path: Path) -> None:
+def test_what_cannot_be_read_says_where(kind, old, new, sentence, tmp_path):
     assert old in WHOLE[kind]
     assert sentence in finding_of(WHOLE[kind].replace(old, new), f"bad.{kind}", tmp_path)
 
 
-def test_a_loop_that_is_drawn_open_is_refused(tmp_path: Path) -> None:
+def test_a_loop_that_is_drawn_open_is_refused(tmp_path):
     sites = MJCF.replace('body1="coupler" body2="rocker" anchor', 'site1="a" site2="b" x')
     sites = sites.replace('<joint name="B"/>', f'<joint name="B"/><site name="a" pos="{BC!r} 0 0"/>')
     closed, opened = (sites.replace('<joint name="D"/>', f'<joint name="D"/><site name="b" pos="{x!r} 0 0"/>')
@@ -507,7 +502,7 @@ def test_a_loop_that_is_drawn_open_is_refused(tmp_path: Path) -> None:
     assert "2 mm apart as the file draws them" in finding_of(opened, "open.mjcf", tmp_path)
 
 
-def test_names_of_any_kind_survive(tmp_path: Path) -> None:
+def test_names_of_any_kind_survive(tmp_path):
     text = MJCF.replace('"crank"', '"Kurbel Ø 8 &amp; Co."').replace('"coupler"', '"杆 &lt;1&gt;"')
     (tmp_path / "names.mjcf").write_text(text, "utf-8")
     made = imported(tmp_path / "names.mjcf")
@@ -517,7 +512,7 @@ def test_names_of_any_kind_survive(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["durango-fourbar", "rssr"])
-def test_the_drive_of_an_mjcf_holds_its_speed(name: str, tmp_path: Path) -> None:
+def test_the_drive_of_an_mjcf_holds_its_speed(name, tmp_path):
     """In MuJoCo, from rest, after 50 ms; loads and friction are not in the file."""
     mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "model.mjcf"

@@ -1,7 +1,5 @@
 """STEP files: parts, joints and placements against closed forms; torques against models written by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,12 +1,8 @@
 """Angles that begin anew, are cut off or off, and zeros beyond what is stated of a sensor."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +26,7 @@ LOADED = {**FOUR_BAR, "loads": {"brake": {"joint": "D", "resisting_torque": "20 
 RATES = {"M": {"column": "M", "measures": "effort:A", "unit": "N m"}, "psi": CHANNELS["psi"]}
 
 
-def braked(folder: Path, zero: float) -> Any:
+def braked(folder, zero):
     """Torque of the crank against 20 N m at the rocker, by virtual work, and the rocker's angle; 85 mm long."""
     random = np.random.default_rng(5)
     rows = np.arange(13 * 500)
@@ -51,9 +47,7 @@ def braked(folder: Path, zero: float) -> Any:
 
 @pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "60 Hz"}}])
 @pytest.mark.parametrize("rate", [250.0, 4000.0])  # a cubic between samples, and means of them
-def test_angles_that_begin_anew_or_count_on_have_the_same_course_in_every_turn(
-    tmp_path: Path, rate: float, low_pass: dict[str, Any]
-) -> None:
+def test_angles_that_begin_anew_or_count_on_have_the_same_course_in_every_turn(tmp_path, rate, low_pass):
     """That of the rocker passes its zero twice a turn, that of the crank jumps from 360° to 0, or counts all turns."""
     random = np.random.default_rng(2)
     time = np.arange(int(8.5 * rate)) / rate
@@ -82,7 +76,7 @@ def test_angles_that_begin_anew_or_count_on_have_the_same_course_in_every_turn(
     assert np.degrees(result["rms"].values).max() < 0.05
 
 
-def in_steps(folder: Path, zero: float = 0.0, noise: float = 0.05) -> Any:
+def in_steps(folder, zero=0.0, noise=0.05):
     """Three files whose angle, cut off to 0.1°, reads so much too little, deg; noise of the torque, N m."""
     files = []
     for name, rpm in (("a", 61.3), ("b", 122.7), ("c", 203.9)):
@@ -110,7 +104,7 @@ def in_steps(folder: Path, zero: float = 0.0, noise: float = 0.05) -> Any:
 
 
 @pytest.mark.parametrize("noise", [0.05, 1.0])
-def test_a_wrong_zero_of_the_angle_is_not_taken_for_half_a_step(tmp_path: Path, noise: float) -> None:
+def test_a_wrong_zero_of_the_angle_is_not_taken_for_half_a_step(tmp_path, noise):
     """1.4° are 48 standard uncertainties of half a step: an error, also where noise hides most of the misfit."""
     result = in_steps(tmp_path, 1.4, noise)
     told = {one.code: one for one in result.trunnion.findings}
@@ -122,7 +116,7 @@ def test_a_wrong_zero_of_the_angle_is_not_taken_for_half_a_step(tmp_path: Path, 
     assert re.fullmatch(r"\S+ ± \S+ °", next(row[1] for row in table.rows if row[0].startswith("angle in steps")))
 
 
-def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:
+def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path):
     """Half a step of 0.1° is √3 of its standard uncertainty: one error, which three files tell better than one."""
     result = in_steps(tmp_path)
     names = [str(one) for one in result["sensor"].values]
@@ -135,7 +129,7 @@ def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> 
     assert np.degrees(float(result["sensor_size"][at])) == pytest.approx(0.1 / np.sqrt(12))
 
 
-def with_zero(folder: Path, offset: float, zero: float) -> Any:
+def with_zero(folder, offset, zero):
     """Identified from a torque that is off, with the stated standard uncertainty of its zero, N m."""
     data = braked(folder, 0.0)
     (one,) = data.conditions
@@ -146,7 +140,7 @@ def with_zero(folder: Path, offset: float, zero: float) -> Any:
     return trunnion.rig.identify(model, data, ["brake.resisting_torque"])
 
 
-def test_a_zero_far_beyond_what_is_stated_is_an_error_though_the_model_fits(tmp_path: Path) -> None:
+def test_a_zero_far_beyond_what_is_stated_is_an_error_though_the_model_fits(tmp_path):
     """An offset of 0.02 N m is hidden by the scatter, but is 20 stated standard uncertainties."""
     result = with_zero(tmp_path, 0.02, 0.001)
     told = {one.code: one for one in result.trunnion.findings}

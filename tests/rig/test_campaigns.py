@@ -1,7 +1,5 @@
 """Whole campaigns, from data files to verdicts, efficiencies and friction: the figures may not change unawares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -23,7 +21,7 @@ TORQUE = {"range": "20 N m", "noise": "10 mN m", "bits": 16, "accuracy": {"gain"
 COARSE = TORQUE | {"range": "400 N m", "bits": 12, "span": "409.6 N m", "noise": "20 mN m"}  # in steps of 0.2 N m
 
 
-def cardan_rig(torque: dict[str, Any], **changes: Any) -> dict[str, Any]:
+def cardan_rig(torque, **changes):
     """A Cardan joint between two sensors of torque and speed."""
     measures = {"torque-in": "effort:input", "torque-out": "load:brake"}
     speeds = {"speed-in": "rate:input", "speed-out": "rate:output"}
@@ -43,7 +41,7 @@ COMPRESSOR = {
         "n": {"measures": "rate:O", "unit": "rpm", "noise": "0.5 rpm"},
     },
 }  # fmt: skip
-CAMPAIGNS: dict[str, tuple[str, dict[str, float], dict[str, Any], int]] = {
+CAMPAIGNS = {
     "true": ("pezzuti-cardan", {}, cardan_rig(TORQUE), 4),
     "less friction": ("pezzuti-cardan", {FRICTION: 0.36}, cardan_rig(TORQUE), 4),
     "steps": (
@@ -58,11 +56,11 @@ Campaign = Callable[[str], tuple[trunnion.Mechanism, Any]]
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+def campaign(tmp_path_factory):
     """The model as it is in its file, and the measurement of one with another friction, by the name of the campaign."""
 
     @cache
-    def measured(name: str) -> tuple[trunnion.Mechanism, Any]:
+    def measured(name):
         model, changes, rig, seed = CAMPAIGNS[name]
         mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
         folder = tmp_path_factory.mktemp("campaign") / "data"
@@ -75,7 +73,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("name", CAMPAIGNS)
-def test_verdicts(campaign: Campaign, name: str) -> None:
+def test_verdicts(campaign, name):
     """Torque at the drive of a joint whose friction is not the model's is not within; everything else is."""
     verdicts = trunnion.rig.compare(*campaign(name)).verdict
     other = verdicts.sel(channel="torque-in").values if name in ("less friction", "steps") else np.empty(0)
@@ -92,7 +90,7 @@ def test_verdicts(campaign: Campaign, name: str) -> None:
         ("steps", [0.92507, 0.84794], [0.016642, 0.015445]),
     ],
 )
-def test_efficiencies(campaign: Campaign, name: str, efficiency: list[float], expanded: list[float]) -> None:
+def test_efficiencies(campaign, name, efficiency, expanded):
     found = trunnion.rig.compare(*campaign(name))
     assert found.efficiency.values == pytest.approx(efficiency, abs=2e-5)
     assert found.efficiency_expanded.values == pytest.approx(expanded, rel=2e-3)
@@ -107,9 +105,7 @@ def test_efficiencies(campaign: Campaign, name: str, efficiency: list[float], ex
         ("compressor", "S.friction.coefficient", 0.060825, 1.7229e-3, 0.9779),
     ],
 )
-def test_friction(
-    campaign: Campaign, name: str, path: str, estimate: float, uncertainty: float, reduced: float
-) -> None:
+def test_friction(campaign, name, path, estimate, uncertainty, reduced):
     """Estimate, standard uncertainty and reduced χ²; the interval holds the true value but once in twenty."""
     found = trunnion.rig.identify(*campaign(name), {"mu": path})
     assert found.estimate.item() == pytest.approx(estimate, abs=0.02 * uncertainty)
@@ -123,7 +119,7 @@ PULSES = {name: {"measures": what, "unit": "rpm", "per_turn": 60, "noise": "0.2 
           for name, what in {"speed-in": "rate:input", "speed-out": "rate:output"}.items()}  # fmt: skip
 
 
-def test_speeds_of_pulses_are_compared_as_their_sensor_shows_them(tmp_path: Path) -> None:
+def test_speeds_of_pulses_are_compared_as_their_sensor_shows_them(tmp_path):
     """60 pulses smooth the speed of a Cardan joint at 30° by 0.7 rpm: the true model agrees, one 1° off does not."""
     schedule = {"over": {"misalignment": ["15 deg", "30 deg"]}, "turns": 20, "idle": "0.5 s"}
     mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan.yaml")
@@ -137,7 +133,7 @@ def test_speeds_of_pulses_are_compared_as_their_sensor_shows_them(tmp_path: Path
 
 
 @pytest.mark.parametrize("per_turn", [24, 60])
-def test_pulses_at_any_angle_show_the_mean_of_a_speed(per_turn: int) -> None:
+def test_pulses_at_any_angle_show_the_mean_of_a_speed(per_turn):
     """The sensor of the virtual rig, begun at 40 places of a pulse: the mean of what it shows, and its scatter."""
     count, duration = 36_000, 0.12
     phase = np.arange(count) / count

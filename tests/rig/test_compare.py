@@ -1,7 +1,5 @@
 """A model beside a measurement: verdicts, what is named, and what has no answer."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +39,7 @@ def codes(result):
 COVERED = stats.norm.cdf(2) - stats.norm.cdf(-2)  # of k = 2
 
 
-def test_scatter_between_turns_is_that_of_a_sample() -> None:
+def test_scatter_between_turns_is_that_of_a_sample():
     """1, 2, 4: s² = (16 + 1 + 25)/9/2 = 7/3, of the mean s²/3."""
     one = course("torque", np.array([[1.0], [2.0], [4.0]]))
     assert one.scatter == pytest.approx((7 / 3) ** 0.5)
@@ -51,7 +49,7 @@ def test_scatter_between_turns_is_that_of_a_sample() -> None:
 
 @pytest.mark.parametrize("resolution", [0.0, 0.9, 3.0])
 @pytest.mark.parametrize("zero", [0.0, 0.05])
-def test_uncertainty_of_a_bias(resolution: float, zero: float) -> None:
+def test_uncertainty_of_a_bias(resolution, zero):
     """Means of turns scatter by s/√n; steps of the readings give step/√12 at each of the positions, each its own, so
     /√N in the mean; the zero is that of all of them. k is Student's for (n − 1) u⁴/u_A⁴."""
     offsets, positions = np.array([-0.2, 0.1, 0.3, -0.2]), 25

@@ -1,14 +1,9 @@
 """How often 95 % intervals hold true frictions where a torque is read in steps and sampled alike in every turn."""
 
-from __future__ import annotations
-
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from numpy.typing import NDArray
 
 import trunnion
@@ -17,7 +12,7 @@ Array = NDArray[np.float64]
 TRUE = {"A": 0.08, "B": 0.14, "C": 0.11, "D": 0.06}
 RADII = {"A": "15 mm", "B": "10 mm", "C": "10 mm", "D": "12 mm"}
 LINKS = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
-MODEL: dict[str, Any] = {
+MODEL = {
     "trunnion": 1,
     "space": "planar",
     "gravity": [0, -9.81],
@@ -39,14 +34,14 @@ STEP = 0.2  # N m
 
 
 @cache
-def torque(rpm: float) -> Array:
+def torque(rpm):
     """Of the drive with the true frictions, at 3600 angles, N m."""
-    values: dict[str, float | str] = {**dict(zip(COEFFICIENTS, TRUE.values(), strict=True)), "A.speed": f"{rpm} rpm"}
+    values = {**dict(zip(COEFFICIENTS, TRUE.values(), strict=True)), "A.speed": f"{rpm} rpm"}
     found = trunnion.analyse(trunnion.Mechanism(**MODEL).with_values(values), steps=3600)
     return np.asarray(found["drive_effort"].values, float).ravel()
 
 
-def identified(folder: Path, seed: int, noise: float, rpm: float = 120.0, positions: int = 360) -> xr.Dataset:
+def identified(folder, seed, noise, rpm=120.0, positions=360):
     """The frictions by 12 turns of a sensor with errors of its own, sampled at 1 kHz; noise: in steps."""
     random = np.random.default_rng(seed)
     time = np.arange(int(12.7 * 60 / rpm * 1000)) / 1000
@@ -69,13 +64,13 @@ def identified(folder: Path, seed: int, noise: float, rpm: float = 120.0, positi
     )
 
 
-def held(result: xr.Dataset) -> Array:
+def held(result):
     """Whether each interval holds."""
     true = np.array(list(TRUE.values()))
     return np.asarray((result["lower"].values <= true) & (true <= result["upper"].values))
 
 
-def test_steps_that_repeat_are_a_source(tmp_path: Path) -> None:
+def test_steps_that_repeat_are_a_source(tmp_path):
     """Of the friction at D they are most of the variance, but of turns that are not sampled alike."""
     found = {rpm: [identified(tmp_path, seed, 0.25, rpm) for seed in (1, 2, 3)] for rpm in (120.0, 118.3)}
     shares = {
@@ -90,7 +85,7 @@ def test_steps_that_repeat_are_a_source(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, pytest.param(0.1, marks=pytest.mark.slow)])
-def test_a_file_that_spans_three_steps_has_those_of_the_others(tmp_path: Path, noise: float) -> None:
+def test_a_file_that_spans_three_steps_has_those_of_the_others(tmp_path, noise):
     """The torque into a Cardan joint at 5°, whose two levels tell no step; of 12 rigs of a true 95 % one misses."""
     friction, cardan = "joint_defaults.friction.coefficient", trunnion.read("examples/pezzuti-cardan.yaml")
     torque = {"measures": "effort:input", "range": "25 N m", "span": "25.6 N m", "bits": 8,
@@ -109,7 +104,7 @@ def test_a_file_that_spans_three_steps_has_those_of_the_others(tmp_path: Path, n
     assert hits >= 11
 
 
-def test_fewer_positions_than_unknowns(tmp_path: Path) -> None:
+def test_fewer_positions_than_unknowns(tmp_path):
     found = identified(tmp_path, 1, 0.25, positions=8)
     assert "parameter.not_told_apart" in {one.code for one in found.trunnion.findings}
     assert np.isnan(found.estimate.values).any()
@@ -117,7 +112,7 @@ def test_fewer_positions_than_unknowns(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("noise", "seeds"), [(0.25, 300), (0.1, 150)])
-def test_coverage_where_steps_repeat(tmp_path: Path, noise: float, seeds: int) -> None:
+def test_coverage_where_steps_repeat(tmp_path, noise, seeds):
     """Of 300 measurements 88 % at least: of a true 93 % that fails in 0.03 % of cases, of 80 % in all but 0.03 %."""
     every = np.array([held(identified(tmp_path, seed, noise)) for seed in range(seeds)])
     assert np.all(np.mean(every, axis=0) >= 0.88), np.mean(every, axis=0)

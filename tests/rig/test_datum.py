@@ -1,10 +1,5 @@
 """A sensor whose reading of 0 is a place of the rig: an error of its gain acts on what it reads, not on the place."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -17,9 +12,9 @@ CRANK, ROD, AHEAD, DATUM = 40.0, 160.0, 10.0, 120.0  # mm
 GAIN, ZERO = 0.002, 0.2  # stated: relative, mm
 
 
-def crank(guide: float = 0.0, rod: float = ROD) -> trunnion.Mechanism:
+def crank(guide=0.0, rod=ROD):
     """A slider-crank whose slide is counted from a point of its guide, mm."""
-    data: dict[str, Any] = {
+    data = {
         "links": {
             "ground": {"points": {"O": [0, 0], "S": {"at": [f"{guide} mm", f"{AHEAD} mm"], "axis": [1, 0]}}},
             "crank": {"points": {"O": [0, 0], "A": [f"{CRANK} mm", 0]}},
@@ -39,7 +34,7 @@ def crank(guide: float = 0.0, rod: float = ROD) -> trunnion.Mechanism:
     return trunnion.Mechanism(trunnion=1, name="crank", space="planar", **data)
 
 
-def measured(folder: Path, gain: float, **channel: Any) -> Any:
+def measured(folder, gain, **channel):
     """The slide as a sensor reads it that begins at the datum: −1 times, in hundredths of mm, as a sign shows it."""
     count, turns = 360, 6
     angle = np.arange(count * turns) * 2 * np.pi / count
@@ -56,7 +51,7 @@ def measured(folder: Path, gain: float, **channel: Any) -> Any:
     }, [folder / "run.csv"])  # fmt: skip
 
 
-def test_the_uncertainty_of_a_gain_acts_on_the_reading(tmp_path: Path) -> None:
+def test_the_uncertainty_of_a_gain_acts_on_the_reading(tmp_path):
     """As of a model whose guide begins where the sensor does, and in closed form by the mean of the readings."""
     data = measured(tmp_path, 1.02, zero=f"{DATUM} mm")
     course = data.conditions[0].courses["W"]
@@ -75,7 +70,7 @@ def test_the_uncertainty_of_a_gain_acts_on_the_reading(tmp_path: Path) -> None:
     assert trunnion.rig.compare(crank(), measured(tmp_path, 1.0, zero=f"{DATUM} mm")).verdict.item() == Verdict.WITHIN
 
 
-def test_a_gain_is_estimated_of_the_reading(tmp_path: Path) -> None:
+def test_a_gain_is_estimated_of_the_reading(tmp_path):
     """A length and its interval are those of the model whose guide begins where the sensor does."""
     found = trunnion.rig.identify(crank(rod=161.0), measured(tmp_path, 1.003, zero=f"{DATUM} mm"), ["l"])
     other = trunnion.rig.identify(crank(DATUM, 161.0), measured(tmp_path, 1.003), ["l"])

@@ -1,12 +1,9 @@
 """Efficiency from measured courses: what it is, and whether its uncertainty is what many rigs would scatter by."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, efficiency_of
@@ -31,7 +28,7 @@ NOISE = {"T1": 0.3, "T2": 0.2, "n1": 0.5, "n2": 0.5}
 ETA = float(np.mean(TRUE["T2"] * TRUE["n2"]) / np.mean(TRUE["T1"] * TRUE["n1"]))
 
 
-def condition(turns: dict[str, NDArray[np.float64]], accuracy: dict[str, Accuracy] | None = None) -> Condition:
+def condition(turns, accuracy=None):
     known = ACCURACY if accuracy is None else accuracy
     courses = {
         name: Signal(name, MEASURES[name], "", values, known.get(name, Accuracy())) for name, values in turns.items()
@@ -39,12 +36,12 @@ def condition(turns: dict[str, NDArray[np.float64]], accuracy: dict[str, Accurac
     return Condition("one", {}, PHASE, courses)
 
 
-def exact(turns: int = 3) -> dict[str, NDArray[np.float64]]:
+def exact(turns=3):
     return {name: np.tile(course, (turns, 1)) for name, course in TRUE.items()}
 
 
 @pytest.mark.slow
-def test_uncertainty_is_the_scatter_of_many_rigs() -> None:
+def test_uncertainty_is_the_scatter_of_many_rigs():
     """2000 rigs with errors and noise as stated: their standard deviation is u, and 2 u covers 95 %."""
     random = np.random.default_rng(5)
     values, uncertainties = [], []
@@ -64,7 +61,7 @@ def test_uncertainty_is_the_scatter_of_many_rigs() -> None:
     assert np.mean(inside) == pytest.approx(0.955, abs=0.02)
 
 
-def test_contributions_are_those_of_small_changes() -> None:
+def test_contributions_are_those_of_small_changes():
     """The effect of each gain and zero is what changing the readings by it does, and their squares add up."""
     found = efficiency_of(condition(exact()))
     for one in found.contributions:
@@ -81,7 +78,7 @@ def test_contributions_are_those_of_small_changes() -> None:
     assert found.expanded == 2 * found.uncertainty
 
 
-def test_one_speed_sensor_for_both_sides_cancels() -> None:
+def test_one_speed_sensor_for_both_sides_cancels():
     """A speed that is measured once stands in both powers: its gain does nothing."""
     turns = {name: exact()[name] for name in ("T1", "T2", "n1")}
     found = efficiency_of(condition(turns, {"n1": Accuracy(0.0, 0.01)}))
@@ -89,7 +86,7 @@ def test_one_speed_sensor_for_both_sides_cancels() -> None:
     assert found.uncertainty == pytest.approx(0.0, abs=1e-12)
 
 
-def test_gaps_and_single_turns() -> None:
+def test_gaps_and_single_turns():
     """A turn that lacks much is left out, one that lacks little has it of the others; one turn has no scatter."""
     turns = exact(4)
     turns["T1"][1, 5] = turns["n2"][2, 7] = np.nan  # where power in and out are not those of the mean
@@ -112,12 +109,12 @@ def test_gaps_and_single_turns() -> None:
         efficiency_of(condition({**exact(), "T1": np.where(np.arange(POSITIONS) == 3, np.nan, exact()["T1"])}))
 
 
-def test_a_dead_sensor_is_told() -> None:
+def test_a_dead_sensor_is_told():
     with pytest.raises(MechanismError, match="there is no input power: T1 or n1 reads 0 throughout"):
         efficiency_of(condition({**exact(), "T1": np.zeros((3, POSITIONS))}))
 
 
-def test_resolution_counts_where_noise_does_not_carry_over_the_steps() -> None:
+def test_resolution_counts_where_noise_does_not_carry_over_the_steps():
     """Readings that never change are known to step/√12; noisy ones average out."""
     coarse = {"T2": Accuracy(resolution=0.1)}
     still = efficiency_of(condition(exact(), coarse))
@@ -129,7 +126,7 @@ def test_resolution_counts_where_noise_does_not_carry_over_the_steps() -> None:
 
 
 @pytest.mark.parametrize("swing", [0.02, 0.1, 0.3])
-def test_powers_are_means_over_time_where_the_speed_varies(swing: float) -> None:
+def test_powers_are_means_over_time_where_the_speed_varies(swing):
     """Against energies over a turn, integrated in time: positions are equal steps of the angle."""
     fine = 2 * np.pi * (np.arange(20_000) + 0.5) / 20_000
     torque, speed = (lambda at: 10 + 8 * np.sin(2 * at)), (lambda at: 19 * (1 + swing * np.sin(2 * at)))
@@ -145,7 +142,7 @@ def test_powers_are_means_over_time_where_the_speed_varies(swing: float) -> None
     assert timed.value == pytest.approx(9 * np.mean(speed(CYCLE)) / np.mean(torque(CYCLE) * speed(CYCLE)))
 
 
-def test_few_turns_have_the_factor_of_student() -> None:
+def test_few_turns_have_the_factor_of_student():
     """GUM, Table G.2: 13.97 for one degree of freedom, 4.53 for two; 2 where a sensor's own uncertainty prevails."""
     noise = np.random.default_rng(3).standard_normal((3, POSITIONS))
     turns = {**exact(), "T1": exact()["T1"] + noise}
@@ -158,7 +155,7 @@ def test_few_turns_have_the_factor_of_student() -> None:
     assert efficiency_of(condition(turns, {"T2": Accuracy(zero=10.0)})).factor() == pytest.approx(2, abs=1e-3)
 
 
-def test_scatter_of_the_efficiency_is_that_of_a_sample_of_turns() -> None:
+def test_scatter_of_the_efficiency_is_that_of_a_sample_of_turns():
     """Brake torques of 0.9, 1 and 1.2 times the same course: η by as much, and s/√3 with s² of the three over 2."""
     shares = np.array([0.9, 1.0, 1.2])
     found = efficiency_of(condition({**exact(), "T2": shares[:, None] * TRUE["T2"]}, {}))
@@ -168,7 +165,7 @@ def test_scatter_of_the_efficiency_is_that_of_a_sample_of_turns() -> None:
     assert found.uncertainty == pytest.approx(ETA * (spread / 3) ** 0.5, rel=1e-9)
 
 
-def test_contributions_count_what_a_speed_does_to_the_time() -> None:
+def test_contributions_count_what_a_speed_does_to_the_time():
     """Where the driver's speed gives each position its time, small changes of it are those of the ratio too."""
     turns = exact()
     turns["n1"] = turns["n1"] * (1 + 0.2 * np.sin(2 * CYCLE + 0.4))

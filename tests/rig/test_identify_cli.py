@@ -1,7 +1,5 @@
 """`trunnion identify` as it is called: tables, files, figures, report, the model written back, and what is refused."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -28,7 +26,7 @@ sensors:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """The model, and measurements of it with a friction coefficient of 0.35."""
     place = tmp_path_factory.mktemp("rig")
     shutil.copy(ROOT / "examples" / MODEL, place)
@@ -43,8 +41,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):  # type: ignore[no-untyped-def]
-    def run(*options: str, mapping: str = "data/mapping.yaml") -> tuple[int, str]:
+def call(folder, monkeypatch, capsys):
+    def run(*options, mapping="data/mapping.yaml"):
         monkeypatch.chdir(folder)
         monkeypatch.setenv("COLUMNS", "160")
         monkeypatch.setattr("sys.argv", ["trunnion", "identify", MODEL, mapping, *options])
@@ -58,16 +56,14 @@ def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
 
 
 @pytest.mark.slow
-def test_estimates_of_a_model_that_does_not_fit_are_not_written(  # type: ignore[no-untyped-def]
-    folder: Path, call, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_estimates_of_a_model_that_does_not_fit_are_not_written(folder, call, monkeypatch):
     """The crank angle 10° off: a coefficient that makes up for it is no coefficient of friction."""
     results, identify = [], identification.identify
 
-    def once(*numbers: object, **options: object) -> object:
+    def once(*numbers, **options):
         """Both commands identify the same."""
         if not results:
-            results.append(identify(*numbers, **options))  # type: ignore[arg-type]
+            results.append(identify(*numbers, **options))
         return results[0]
 
     monkeypatch.setattr(identification, "identify", once)
@@ -85,7 +81,7 @@ def test_estimates_of_a_model_that_does_not_fit_are_not_written(  # type: ignore
 
 
 @pytest.mark.slow
-def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore[no-untyped-def]
+def test_tables_files_and_the_model(folder, call):
     files = ["x.csv", "x.fit.csv", "x.residuals.csv", "x.nc", "x.json", "x.svg"]
     outs = [part for name in files for part in ("--out", name)]
     status, text = call("--parameter", f"mu={FRICTION}", "--start", "mu=0.3", "--hold-out", "misalignment=25 deg",
@@ -125,7 +121,7 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
         (["--parameter", FRICTION, "--guard", "-1"], "guard"),
     ],
 )
-def test_bad_input_is_told(call, options: list[str], message: str) -> None:  # type: ignore[no-untyped-def]
+def test_bad_input_is_told(call, options, message):
     status, text = call(*options)
     assert status == 2
     assert message in text

@@ -1,10 +1,6 @@
 """A misfit by an error of the crank angle or of a sensor: no estimate, and `compare` shows the error with its size."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,13 +22,13 @@ RIG = {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     found = tmp_path_factory.mktemp("rig")
     trunnion.rig.observe(trunnion.read(MODEL), RIG, seed=3).write(found)
     return found
 
 
-def identified(folder: Path, old: str = "", new: str = "", model: str = MODEL, **values: Any) -> Any:
+def identified(folder, old="", new="", model=MODEL, **values):
     text = (folder / "mapping.yaml").read_text()
     assert old in text
     (folder / "changed.yaml").write_text(text.replace(old, new) if old else text)
@@ -53,7 +49,7 @@ CASES = {
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
-def test_a_misfit_is_told_and_compare_explains_it(folder: Path, name: str) -> None:
+def test_a_misfit_is_told_and_compare_explains_it(folder, name):
     old, new, kind, size, near = CASES[name]
     result = identified(folder, old, new)
     assert result["reduced_chi_squared"] > 1.5
@@ -66,7 +62,7 @@ def test_a_misfit_is_told_and_compare_explains_it(folder: Path, name: str) -> No
 
 
 @pytest.mark.slow
-def test_the_start_of_a_driver_is_the_zero_of_the_encoder(folder: Path) -> None:
+def test_the_start_of_a_driver_is_the_zero_of_the_encoder(folder):
     """It stays in the model as it is."""
     machine, text = trunnion.read(MODEL), (folder / "mapping.yaml").read_text()
     (folder / "changed.yaml").write_text(text.replace("  per_turn: 360\n", "  per_turn: 360\n  zero: 2 deg\n"))
@@ -76,13 +72,13 @@ def test_the_start_of_a_driver_is_the_zero_of_the_encoder(folder: Path) -> None:
     assert with_estimates(machine, result).parameters()["drivers.O.start"] == 0.0
 
 
-def test_an_error_of_the_model_is_a_misfit(folder: Path) -> None:
+def test_an_error_of_the_model_is_a_misfit(folder):
     """A pressure that is wrong at one point of the table is none of them."""
     result = identified(folder, **{"tables.pressure.points.1.value": "3.5 bar"})
     assert "fit.misfit" in {one.code for one in result.trunnion.findings}
 
 
-def test_what_is_expected_is_the_scatter_of_what_is_used(folder: Path) -> None:
+def test_what_is_expected_is_the_scatter_of_what_is_used(folder):
     """Beside jumps, which are left out, turns scatter ten times as much: they tell nothing of the others."""
     plain = identified(folder)
     used = np.isfinite(plain["residual_after"].values[0])

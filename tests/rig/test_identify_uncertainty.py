@@ -1,11 +1,7 @@
 """Uncertainty of a fitted constant against closed forms: few turns, turns that follow each other, a shared misfit."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,16 +15,16 @@ Array = NDArray[np.float64]
 FAR = 1e3  # of the constant: the same figures wherever it lies
 
 
-def constant(conditions: Sequence[Array]) -> Fit:
+def constant(conditions):
     """The mean of one channel in all conditions as the only unknown; turns: (turn, position) by condition."""
 
-    def courses(x: Array) -> Any:
+    def courses(x):
         sizes = [one.shape[1] for one in conditions]
         return [SimpleNamespace(values={"torque": np.full(size, x[0])}, slopes={"torque": np.ones((1, size))})
                 for size in sizes]  # fmt: skip
 
     measure = SimpleNamespace(turning=lambda system: False)
-    model: Any = SimpleNamespace(
+    model = SimpleNamespace(
         unknowns=[SimpleNamespace(lower=-np.inf, upper=np.inf)],
         courses=courses,
         measures={"torque": measure},
@@ -40,7 +36,7 @@ def constant(conditions: Sequence[Array]) -> Fit:
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
-def test_variance_of_a_mean_of_few_turns(count: int) -> None:
+def test_variance_of_a_mean_of_few_turns(count):
     """s²/n with s² of a sample, and n − 1 degrees of freedom."""
     turns = FAR + np.random.default_rng(count).normal(size=(count, 1))
     found = spread_of(constant([turns]), np.array([turns.mean()]))
@@ -49,7 +45,7 @@ def test_variance_of_a_mean_of_few_turns(count: int) -> None:
     assert found.freedom[0] == pytest.approx(count - 1)
 
 
-def test_conditions_of_few_turns_join_their_freedoms() -> None:
+def test_conditions_of_few_turns_join_their_freedoms():
     """Of the mean of two means: (s₁²/n₁ + s₂²/n₂)/4 with the freedom of Welch and Satterthwaite, for equal weights."""
     random = np.random.default_rng(5)
     one = random.normal(size=(4, 1))
@@ -61,7 +57,7 @@ def test_conditions_of_few_turns_join_their_freedoms() -> None:
     assert found.freedom[0] == pytest.approx(2 * 3)
 
 
-def test_how_a_turn_follows_the_one_before() -> None:
+def test_how_a_turn_follows_the_one_before():
     """Σ mₖ mₖ₊₁/Σ mₖ² + 1/n: of +1, −1, … twelve times −11/12 + 1/12, and its spread is left as it is."""
     turns = FAR + np.tile([[1.0], [-1.0]], (6, 1))
     found = spread_of(constant([turns]), np.array([FAR]))
@@ -69,7 +65,7 @@ def test_how_a_turn_follows_the_one_before() -> None:
     assert found.parts["scatter"][0, 0] == pytest.approx(12 / 11 / 12, rel=1e-9)
 
 
-def test_turns_that_are_alike_count_as_fewer() -> None:
+def test_turns_that_are_alike_count_as_fewer():
     """Six up, then six down: (10 − 1)/12 + 1/12 = 10/12; the variance grows by (1 + r)/(1 − r) = 11."""
     turns = FAR + np.repeat([[1.0], [-1.0]], 6, axis=0)
     found = spread_of(constant([turns]), np.array([FAR]))
@@ -77,7 +73,7 @@ def test_turns_that_are_alike_count_as_fewer() -> None:
     assert found.parts["scatter"][0, 0] == pytest.approx(11 * 12 / 11 / 12, rel=1e-9)
 
 
-def test_freedom_of_the_lack_of_fit_of_turns_with_one_far_off() -> None:
+def test_freedom_of_the_lack_of_fit_of_turns_with_one_far_off():
     """g χ²_h with the mean and the variance of the squares of the turns, 2 m²/v: those of a sample, (1 + 1/n) of it.
 
     Deviations n − 1, −1, −1, …: their squares over the mean one are n − 1 and 1/(n − 1); one unknown takes half.
@@ -90,7 +86,7 @@ def test_freedom_of_the_lack_of_fit_of_turns_with_one_far_off() -> None:
     assert found.test.freedom == pytest.approx(2 * 0.5**2 / (np.var(shares, ddof=1) * (1 + 1 / n)), rel=1e-9)
 
 
-def test_variance_of_a_mean_of_the_turns_that_have_a_value() -> None:
+def test_variance_of_a_mean_of_the_turns_that_have_a_value():
     """s²/m with s² of the m turns that are there, wherever the others are missing."""
     turns = FAR + np.random.default_rng(4).normal(size=(9, 1))
     there = turns[[0, 2, 3, 7]]
@@ -101,7 +97,7 @@ def test_variance_of_a_mean_of_the_turns_that_have_a_value() -> None:
 
 @pytest.mark.parametrize("length", [1, 20])
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
-def test_lack_of_fit_of_a_true_model_is_one_where_values_are_missing(share: float, length: int) -> None:
+def test_lack_of_fit_of_a_true_model_is_one_where_values_are_missing(share, length):
     """White noise about a constant, a share of its values lost singly or in bursts: χ² is 1 in the mean of 60 draws."""
     random, found = np.random.default_rng(12), []
     for _ in range(60):
@@ -115,14 +111,14 @@ def test_lack_of_fit_of_a_true_model_is_one_where_values_are_missing(share: floa
 
 
 @pytest.mark.parametrize("count", [2, 3])
-def test_a_misfit_that_conditions_share_is_not_independent(count: int) -> None:
+def test_a_misfit_that_conditions_share_is_not_independent(count):
     """The same wave left over in each of C conditions tells C times the variance of waves a share of a turn apart."""
     positions, turns = 32, 6
     angle = 2 * np.pi * np.arange(positions) / positions
     noise = 0.01 * np.random.default_rng(1).normal(size=(turns, positions))
     noise -= noise.mean(axis=0)
 
-    def misfit(apart: float) -> Array:
+    def misfit(apart):
         waves = [FAR + np.sin(angle + k * apart) + noise for k in range(count)]
         found = spread_of(constant(waves), np.array([FAR]))
         assert found.test.misfit

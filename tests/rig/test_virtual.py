@@ -1,24 +1,19 @@
 """The virtual rig: true courses through sensors, files that are read as they were meant, findings."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import trunnion
 from trunnion.errors import MechanismError, Severity
-from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import efficiency_of
-from trunnion.rig.virtual.observe import Observation
 from trunnion.rig.virtual.rig_file import Rig
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "toleranced-fourbar.yaml"
-SENSORS: dict[str, Any] = {
+SENSORS = {
     "T1": {"measures": "effort:A", "range": "10 N m", "noise": "10 mN m", "bits": 14, "offset": "0.1 N m",
            "accuracy": {"gain": "0.5 %", "zero": "20 mN m"}},
     "T2": {"measures": "load:work", "range": "10 N m", "noise": "10 mN m", "bits": 14, "offset": "0.1 N m",
@@ -29,12 +24,12 @@ SENSORS: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def mechanism() -> Mechanism:
+def mechanism():
     return trunnion.read(FOUR_BAR)
 
 
-def rig(**changes: Any) -> Rig:
-    stated: dict[str, Any] = {
+def rig(**changes):
+    stated = {
         "trunnion-rig": 1,
         "schedule": {"over": {"AB": ["1"]}, "turns": 6, "idle": "0.2 s"},
         "rate": "500 Hz",
@@ -46,11 +41,11 @@ def rig(**changes: Any) -> Rig:
 
 
 @pytest.fixture(scope="module")
-def seen(mechanism: Mechanism) -> Observation:
+def seen(mechanism):
     return trunnion.rig.observe(mechanism, rig(), seed=4)
 
 
-def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
+def test_perfect_sensors_show_the_model(mechanism):
     """Each reading is the model at the instant of its sample; idle forces and speeds are 0, places stay."""
     sensors = {
         "T": {"measures": "effort:A"},
@@ -78,7 +73,7 @@ def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
     assert case.efficiency == pytest.approx(float(result["efficiency"]), rel=1e-9)
 
 
-def test_same_seed_same_bits_and_sensors_of_their_own(mechanism: Mechanism, seen: Observation) -> None:
+def test_same_seed_same_bits_and_sensors_of_their_own(mechanism, seen):
     record, again = next(seen.records()), next(trunnion.rig.observe(mechanism, rig(), seed=4).records())
     for name, values in record.columns.items():
         assert np.array_equal(values, again.columns[name])
@@ -91,7 +86,7 @@ def test_same_seed_same_bits_and_sensors_of_their_own(mechanism: Mechanism, seen
         seen.seeded(-1)
 
 
-def test_noise_and_offset_are_as_stated(seen: Observation) -> None:
+def test_noise_and_offset_are_as_stated(seen):
     (case,), record = seen.cases, next(seen.records())
     idle = record.columns["T1"][: case.before]
     assert np.mean(idle) == pytest.approx(seen.drawn["T1"].offset, abs=4 * 0.01 / case.before**0.5)
@@ -104,7 +99,7 @@ def test_noise_and_offset_are_as_stated(seen: Observation) -> None:
     assert np.mean(error) == pytest.approx(0.0, abs=4 * 0.01 / len(error) ** 0.5)
 
 
-def test_efficiency_covers_the_true_one(seen: Observation) -> None:
+def test_efficiency_covers_the_true_one(seen):
     """Over 200 rigs with the same statement of accuracy, η ± 2 u has the model's in about 95 %."""
     deviations = []
     for seed in range(200):
@@ -116,7 +111,7 @@ def test_efficiency_covers_the_true_one(seen: Observation) -> None:
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "tdms"])
-def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_path: Path) -> None:
+def test_files_are_read_as_they_were_meant(seen, form, tmp_path):
     """The mapping reads the files; courses are those that the rig hands on itself, the same in all formats."""
     pytest.importorskip({"csv": "pandas", "parquet": "pyarrow", "tdms": "nptdms"}[form])
     from trunnion.rig.reading.read import read_measured
@@ -143,7 +138,7 @@ def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["T, in", "T; in", 'T "in"', "#T", "T [a]", "'T'", "Drehmoment ä"])
-def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tmp_path: Path) -> None:
+def test_names_with_separators_are_read_back(mechanism, name, tmp_path):
     changes = {"sensors": {name: SENSORS["T1"], "n1": SENSORS["n1"]}}
     trunnion.rig.observe(mechanism, rig(**changes)).write(tmp_path)
     read = trunnion.rig.read(tmp_path / "mapping.yaml")
@@ -151,9 +146,7 @@ def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tm
 
 
 @pytest.mark.parametrize("speed", ["60 rpm", "-60 rpm"])
-def test_an_index_is_at_coordinate_0_whichever_way_the_shaft_turns(
-    mechanism: Mechanism, speed: str, tmp_path: Path
-) -> None:
+def test_an_index_is_at_coordinate_0_whichever_way_the_shaft_turns(mechanism, speed, tmp_path):
     changes = {"encoder": {"per_turn": 90, "index": "z"}, "set": {"A.speed": speed}, "rate": "5 kHz"}
     seen = trunnion.rig.observe(mechanism, rig(sensors={"x": {"measures": "coupler.C.x"}}, **changes))
     seen.write(tmp_path)
@@ -162,7 +155,7 @@ def test_an_index_is_at_coordinate_0_whichever_way_the_shaft_turns(
     assert course == pytest.approx(true, abs=1e-4 * np.ptp(true))
 
 
-def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
+def test_a_load_at_rest_reads_nothing(tmp_path):
     """The strip of the press rests two thirds of the cycle: no cell is empty, the course is read back."""
     press = trunnion.read(EXAMPLES / "indexing-press.yaml")
     sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
@@ -182,7 +175,7 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     assert not [one for one in read.findings if "dropouts" in one.what]
 
 
-def test_grid_and_rows(mechanism: Mechanism) -> None:
+def test_grid_and_rows(mechanism):
     over = {"work.resisting_torque": "2 N m:6 N m:3", "A.speed": ["60 rpm", "120 rpm"]}
     found = trunnion.rig.observe(mechanism, rig(schedule={"over": over, "turns": 1}))
     assert [dict(case.settings) for case in found.cases][:3] == [
@@ -200,7 +193,7 @@ def test_grid_and_rows(mechanism: Mechanism) -> None:
     assert files[1] == {"file": "run-02.csv", "set": {"work.resisting_torque": "2 N m", "A.speed": "120 rpm"}}
 
 
-def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> None:
+def test_conditions_that_lock_are_left_out_and_told(mechanism):
     rows = [{"joint_defaults.friction.coefficient": 0.1}, {"l2": "80 mm"}, {"l2": "85 mm"}]
     rows[0] = {"work.resisting_torque": "5 N m"}
     found = trunnion.rig.observe(mechanism, rig(schedule={"conditions": rows, "turns": 2}))
@@ -230,9 +223,7 @@ def test_conditions_that_lock_are_left_out_and_told(mechanism: Mechanism) -> Non
         ({"rate": "300 MHz"}, "rate", "rows, a file at most"),
     ],
 )  # fmt: skip
-def test_rigs_that_do_not_fit_the_mechanism(
-    mechanism: Mechanism, changes: dict[str, Any], where: str, what: str
-) -> None:
+def test_rigs_that_do_not_fit_the_mechanism(mechanism, changes, where, what):
     changes = {"encoder": None} | changes
     with pytest.raises(MechanismError) as error:
         trunnion.rig.observe(mechanism, rig(**changes))
@@ -242,7 +233,7 @@ def test_rigs_that_do_not_fit_the_mechanism(
     assert found[0].remedy
 
 
-def test_a_range_is_run_through_once() -> None:
+def test_a_range_is_run_through_once():
     """A driver that ends elsewhere than it starts; its time tells the position."""
     mechanism = trunnion.read(EXAMPLES / "inverted-slider-crank.yaml")
     driver = next(iter(mechanism.drivers))
@@ -259,7 +250,7 @@ def test_a_range_is_run_through_once() -> None:
     assert mapping["channels"]["e"]["zero"]["over"][0] == "-1 s"
 
 
-def test_clipped_readings_are_told(mechanism: Mechanism) -> None:
+def test_clipped_readings_are_told(mechanism):
     sensors = SENSORS | {"T1": SENSORS["T1"] | {"range": "1 N m"}}
     found = trunnion.rig.observe(mechanism, rig(sensors=sensors))
     told = {one.where: one.what for one in found.findings}

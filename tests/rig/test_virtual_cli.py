@@ -1,16 +1,13 @@
 """Rig files and `trunnion rig` as a user meets them."""
 
-from __future__ import annotations
-
 import functools
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import trunnion
-from manual.conftest import Run, program
+from manual.conftest import program
 from trunnion.errors import MechanismError
 from trunnion.rig.virtual import observe, rig_file
 from trunnion.rig.virtual.rig_file import Rig
@@ -23,12 +20,12 @@ RIG = EXAMPLES / "rig" / "fourbar-rig.yaml"
 
 
 @pytest.fixture
-def run(program: Run) -> Run:
+def run(program):
     return functools.partial(program, "rig")
 
 
 @pytest.mark.slow
-def test_files_of_a_rig(run: Run, tmp_path: Path) -> None:
+def test_files_of_a_rig(run, tmp_path):
     planned = run(FOUR_BAR, RIG)
     assert planned.code == 0
     assert not list(tmp_path.iterdir())
@@ -77,9 +74,7 @@ sensors:
         ("range: 10 N m", "range: 10 V", 6, "'10 V' is not in N m", ""),
     ],
 )
-def test_findings_have_line_and_remedy(
-    run: Run, tmp_path: Path, old: str, new: str, line: int, what: str, remedy: str
-) -> None:
+def test_findings_have_line_and_remedy(run, tmp_path, old, new, line, what, remedy):
     assert old in GOOD
     (tmp_path / "rig.yaml").write_text(GOOD.replace(old, new, 1), encoding="utf-8")
     done = run(FOUR_BAR, "rig.yaml")
@@ -90,7 +85,7 @@ def test_findings_have_line_and_remedy(
     assert remedy in done.err
 
 
-def test_the_page_tells_every_key() -> None:
+def test_the_page_tells_every_key():
     """Each key of a rig file is on the page."""
     page = (EXAMPLES.parent / "docs" / "how-to" / "virtual-rig.md").read_text("utf-8")
     for part in (Rig, rig_file.Schedule, rig_file.Encoder, rig_file.Sensor, rig_file.Accuracies):
@@ -98,7 +93,7 @@ def test_the_page_tells_every_key() -> None:
             assert re.search(rf"\b{re.escape(field.alias or name)}\b", page), (part.__name__, name)
 
 
-def test_a_range_keeps_its_unit() -> None:
+def test_a_range_keeps_its_unit():
     rig = Rig(**{"trunnion-rig": 1, "rate": 100, "sensors": {"a": {"measures": "effort:A"}},
                  "schedule": {"over": {"x": "0 deg:30 deg:4", "y": "-1:1:3", "z": ["1 mm"]}}})  # fmt: skip
     rows = rig.schedule.rows()
@@ -110,7 +105,7 @@ def test_a_range_keeps_its_unit() -> None:
                "schedule": {"over": {"x": "0:1:500", "y": "0:1:500"}}}).schedule.rows()  # fmt: skip
 
 
-def test_files_that_no_rig_has_written_stay(run: Run, tmp_path: Path) -> None:
+def test_files_that_no_rig_has_written_stay(run, tmp_path):
     """Neither the rig file itself nor data of a real rig are written over; those of an earlier run are."""
     small = GOOD.replace("rate: 1 kHz", "rate: 500 Hz")
     for name, there in (("mapping.yaml", small), ("truth.yaml", "a: 1\n"), ("run-01.csv", "t\n"), ("rig.yaml", small)):
@@ -128,7 +123,7 @@ def test_files_that_no_rig_has_written_stay(run: Run, tmp_path: Path) -> None:
     assert run(FOUR_BAR, "rig.yaml", "--out", "rig", "--seed", 2).code == 0
 
 
-def _files(folder: Path) -> dict[str, bytes]:
+def _files(folder):
     return {str(one.relative_to(folder)): one.read_bytes() for one in folder.rglob("*") if one.is_file()}
 
 
@@ -136,9 +131,7 @@ def _files(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("where", ["data", "not/yet/there"])
 @pytest.mark.parametrize("form", ["csv", "parquet", "tdms"])
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt(), MemoryError()])
-def test_a_rig_that_fails_leaves_nothing(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, form: str, error: BaseException
-) -> None:
+def test_a_rig_that_fails_leaves_nothing(run, tmp_path, monkeypatch, where, form, error):
     """Neither files of the one that failed nor, where there was an earlier one, other ones than its own."""
     pytest.importorskip({"csv": "pandas", "parquet": "pyarrow", "tdms": "nptdms"}[form])
     (tmp_path / "rig.yaml").write_text(GOOD.replace("rate: 1 kHz", "rate: 500 Hz"), encoding="utf-8")
@@ -146,7 +139,7 @@ def test_a_rig_that_fails_leaves_nothing(
     seen = trunnion.rig.observe(model, rig, 1)
     write = observe.WRITERS[form]
 
-    def fails(*arguments: Any) -> None:
+    def fails(*arguments):
         write(*arguments)
         raise error
 

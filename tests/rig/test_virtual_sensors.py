@@ -1,7 +1,5 @@
 """Sensors of the virtual rig, each step of the chain against what it is by definition."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -11,7 +9,6 @@ from trunnion.rig.reading.units import read_amount, scale
 from trunnion.rig.virtual.observe import phases
 from trunnion.rig.virtual.rig_file import (
     Sensor,
-    SensorChannel,
     SensorErrors,
     draw,
     pulsed,
@@ -22,12 +19,12 @@ from trunnion.rig.virtual.rig_file import (
 )  # fmt: skip
 
 
-def channel(si: str = "N m", **stated: object) -> SensorChannel:
+def channel(si="N m", **stated):
     return resolved("s", Sensor(**{"measures": "effort:A", **stated}), si)
 
 
 @pytest.mark.parametrize("given", ["100 mV/(N m)", "0.01 N m/mV", "10 N m/V"])
-def test_sensitivity_either_way_round(given: str) -> None:
+def test_sensitivity_either_way_round(given):
     """Reading per quantity or quantity per reading; sizes in either unit come to the same."""
     found = channel(
         sensitivity=given, range="10 V", noise="5 mV", offset="0.2 N m", drift="360 mV/h", span="10 V", bits=12
@@ -43,7 +40,7 @@ def test_sensitivity_either_way_round(given: str) -> None:
 
 
 @pytest.mark.parametrize("given", ["60 Hz/(rev/s)", "1 Hz/rpm", "1 rpm/Hz", "0.001 kHz/rpm"])
-def test_speed_by_pulse_frequency(given: str) -> None:
+def test_speed_by_pulse_frequency(given):
     """60 pulses a turn give 60 Hz at a turn a second, and the mapping reads them so."""
     found = channel("rad/s", measures="rate:A", sensitivity=given, range="4000 rpm", noise="0.5 Hz", unit="Hz")
     assert found.per == pytest.approx(60 / (2 * np.pi))
@@ -67,7 +64,7 @@ def test_speed_by_pulse_frequency(given: str) -> None:
         ({"unit": "rpm"}, "unit", "does not measure a quantity in N m"),
     ],
 )
-def test_what_does_not_fit(stated: dict[str, object], where: str, what: str) -> None:
+def test_what_does_not_fit(stated, where, what):
     with pytest.raises(MechanismError) as error:
         channel(**stated)
     (finding,) = error.value.findings
@@ -75,7 +72,7 @@ def test_what_does_not_fit(stated: dict[str, object], where: str, what: str) -> 
     assert what in finding.what
 
 
-def test_low_pass_is_that_of_first_order() -> None:
+def test_low_pass_is_that_of_first_order():
     """Amplitude 1/√(1 + (f/f₀)²) and phase −atan(f/f₀) of a sine; a constant stays."""
     rate, cut, frequency = 2000.0, 50.0, 40.0
     time = np.arange(4000) / rate
@@ -89,7 +86,7 @@ def test_low_pass_is_that_of_first_order() -> None:
     assert straight[-1] == pytest.approx(19999.0, abs=0.01)
 
 
-def test_speed_by_pulses() -> None:
+def test_speed_by_pulses():
     """Exact at a constant speed; otherwise the means over each pitch, at its middle: what is quicker is lost."""
     running = slice(100, 2100)
     true = np.zeros(2200)
@@ -111,7 +108,7 @@ def test_speed_by_pulses() -> None:
     assert not np.any(pulsed(slow, slice(0, 50), 60, 1000.0))  # no second pulse
 
 
-def test_converter() -> None:
+def test_converter():
     """Steps of the span, clipped at the range, one step short at the upper end of the converter."""
     found = channel(range="8 N m", span="10 N m", bits=4)
     assert found.step == 1.25
@@ -123,7 +120,7 @@ def test_converter() -> None:
     assert channel(noise="0.05 N m").decimals == 5
 
 
-def test_order_of_the_chain() -> None:
+def test_order_of_the_chain():
     """Gain and drift on the true value, offset always, the zero of the running sensor while it runs."""
     found = channel(drift="0.1 N m/s", sensitivity="1 V/(N m)")
     true = np.array([0.0, 0.0, 10.0, 10.0, 0.0])
@@ -131,7 +128,7 @@ def test_order_of_the_chain() -> None:
     assert answer == pytest.approx([0.2, 0.21, 11 + 0.5 + 0.2 + 0.02, 11 + 0.5 + 0.2 + 0.03, 0.24])
 
 
-def test_streams_are_apart_and_the_same_again() -> None:
+def test_streams_are_apart_and_the_same_again():
     one = stream(1, 1, "a", "noise").standard_normal(1000)
     assert np.array_equal(one, stream(1, 1, "a", "noise").standard_normal(1000))
     for other in ((2, 1, "a", "noise"), (1, 2, "a", "noise"), (1, 1, "b", "noise"), (1, 1, "a", "spikes")):
@@ -145,7 +142,7 @@ def test_streams_are_apart_and_the_same_again() -> None:
 @pytest.mark.parametrize(
     ("duration", "rate", "count", "lead"), [(0.12, 2000, 500, 24.5), (0.07, 1000, 800, 3.0), (0.3, 7, 90, 0.5)]
 )
-def test_phases_are_those_of_the_samples(duration: float, rate: float, count: int, lead: float) -> None:
+def test_phases_are_those_of_the_samples(duration, rate, count, lead):
     time, place = phases(duration, rate, count, lead)
     wanted = np.mod((np.arange(count) - lead) / rate, duration)
     apart = np.abs(time[place] - wanted)

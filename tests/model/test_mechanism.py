@@ -91,6 +91,8 @@ def test_defaults_are_followed_until_a_joint_has_its_own_value():
         ("crnk.mass", "there is no number named 'crnk.mass'", "'crank.mass'"),
         ("mass", "stands for 4 numbers", "links.crank.mass"),
         ("", "there is no number named ''", "known"),
+        ("coeficient", "there is no number named 'coeficient'", "did you mean 'coefficient'?"),
+        ("spede", "there is no number named 'spede'", "did you mean 'speed'?"),
         ("A.initial.place", "there is no number named 'A.initial.place'", ""),
         ("crank.inertia.xx", "there is no number named 'crank.inertia.xx'", ""),
         ("A.pin.radius.x", "there is no number named 'A.pin.radius.x'", "'A.pin.radius'"),

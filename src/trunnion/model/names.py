@@ -91,6 +91,9 @@ class ParameterNames:
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
         remedy = nearest(name, [*self.paths, *self.endings] if "." in name or not dimensions else dimensions)
+        if not remedy.startswith("did you mean"):
+            longer = [ending for ending in self.endings if len(ending) > 2 and "." not in ending]
+            remedy = near if (near := nearest(name, longer)).startswith("did you mean") else remedy
         raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 
     @cached_property

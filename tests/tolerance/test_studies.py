@@ -10,6 +10,7 @@ import trunnion
 from mechanisms_parts import example
 from toleranced import FOURBAR, fourbar, fourbar_angle, many
 from trunnion import Mechanism, MechanismError, Status
+from trunnion.results.attributes import findings_of
 from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.linear import study
 
@@ -135,6 +136,20 @@ def test_refused_with_a_finding(name):
     model, options, said = REFUSED[name]
     with pytest.raises(MechanismError, match=said):
         trunnion.tolerance(fourbar(**model), **{"samples": 10, **options})
+
+
+def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance():
+    """l3 is the length of the coupler and that of the rocker: one number for two parts."""
+    data = fourbar().data()
+    data["links"]["rocker"]["points"]["C"] = ["l3", 0]
+    mechanism = Mechanism(**data)
+    for result in (trunnion.check(mechanism), trunnion.tolerance(mechanism, methods=["linear"], steps=12)):
+        said = findings_of(result) if hasattr(result, "attrs") else result.findings
+        (found,) = [one for one in said if one.code == "tolerance.shared_dimension"]
+        assert found.where == "dimensions.l3"
+        assert found.figures["links"] == ["coupler", "rocker"]
+        assert "coupler.C.x" in found.what
+        assert "rocker.C.x" in found.what
 
 
 PLAYS = ("O", "A", "P", "K")

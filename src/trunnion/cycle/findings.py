@@ -141,6 +141,30 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     return notes
 
 
+def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
+    """Of each toleranced dimension that alone sets points of more than one link: as one they vary together, as parts do
+    not.
+
+    Where it stands beside other dimensions, as the radius of a roller between two links does, it is one part's own.
+    """
+    placed = [
+        (path, entry.depends)
+        for path, entry in mechanism.parameter_set.entries.items()
+        if path.startswith("links.") and ".points." in path
+    ]
+    for tolerance in mechanism.tolerated():
+        used = [path for path, depends in placed if depends == (tolerance.path,)]
+        links = list(dict.fromkeys(path.split(".")[1] for path in used))
+        if tolerance.path.startswith("dimensions.") and len(links) > 1:
+            name = tolerance.path.removeprefix("dimensions.")
+            names = [path.removeprefix("links.").replace(".points.", ".") for path in used]
+            more = f" and {len(names) - MOST_PLACES} more" if len(names) > MOST_PLACES else ""
+            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(names[:MOST_PLACES])}{more}): these "
+            what += "links deviate together, by the same amount"
+            remedy = "if the links are made separately, give each a dimension of its own with its own tolerance"
+            yield Finding.note("tolerance.shared_dimension", tolerance.path, what, remedy, name=name, links=links)
+
+
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trunnion.algebra.dual import primal, single
-from trunnion.cycle.findings import Cycle, findings
+from trunnion.cycle.findings import Cycle, findings, shared_dimensions
 from trunnion.cycle.positions import positions
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import named
@@ -65,6 +65,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
         remedy = "the geometry is special: reactions or motion are not determined"
         figures = {"formula": run.system.plan.mobility, "rank": rank}
         notes.append(Finding.warning("mobility.special", "joints", what, remedy, **figures))
+    notes += shared_dimensions(mechanism)
     for measure in named(mechanism, list(mechanism.measures), run.values):
         if not measure.in_time and (measure.at is not None or measure.over is not None):
             try:

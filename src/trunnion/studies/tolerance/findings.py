@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.findings import of_run
+from trunnion.cycle.findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, counted
@@ -103,6 +103,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     if study.effects.correlated:
         what = "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include "
         yield Finding.note("tolerance.correlations_left_out", "correlations", f"{what}them")
+    yield from shared_dimensions(study.run.system.mechanism)
     yield from _of_tolerances(outcome)
     yield from _nominal(outcome)
     for i, of in enumerate(study.orders):

@@ -292,6 +292,12 @@ def test_curve_of_cost_over_accuracy():
     assert result["trade_off_tolerance"].values[2, :4] == pytest.approx(2 * result["tolerance"].values[:4])
 
 
+def test_a_criterion_that_leaves_out_correlations_says_so():
+    model = fourbar(correlations=[{"of": ["l1", "l2"], "coefficient": 0.5}])
+    result = trunnion.allocate(model, criterion="worst-case", steps=24, samples=0)
+    assert "correlations: the criterion worst-case ignores the correlations" in findings(result, "warning")
+
+
 def test_what_cannot_be_allocated():
     for model, text in (
         (fourbar(costs={}), "no tolerance has a cost"),

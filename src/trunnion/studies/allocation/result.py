@@ -224,6 +224,10 @@ def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]
         what = f"the optimality gap is {answer.gap:.1e} of the cost of the tolerances"
         remedy = "check the orders of magnitude"
         yield Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=answer.gap)
+    if criterion != "yield" and allocated.study.effects.correlated:
+        what = f"the criterion {criterion} ignores the correlations"
+        remedy = "use a yield, which includes them"
+        yield Finding.warning("allocation.correlations_left_out", "correlations", what, remedy, criterion=criterion)
     if criterion == "worst-case":
         yield from _searched(allocated, toleranced)
     if criterion == "rss" and "yield" in toleranced:  # three deviations of a normal distribution is what RSS stands for

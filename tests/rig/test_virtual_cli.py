@@ -64,6 +64,7 @@ sensors:
         ("trunnion-rig: 1", "trunnion: 1", 1, "'trunnion-rig' is missing", ""),
         ("range: 10 N m", "range: -10 N m", 6, "is not above zero", "above"),
         ("range: 10 N m", "bits: 12", 6, "neither span nor range", "span"),
+        ("range: 10 N m", "span: 10 N m", 6, "is a span without bits", "bits: 16"),
         ("range: 10 N m", "rangee: 10 N m", 6, "'rangee' is unknown", "'range'"),
         ("range: 10 N m", "per_turn: 60", 6, "a speed only", "rate:"),
         ("range: 10 N m", "column: t", 6, "that of time too", "column"),

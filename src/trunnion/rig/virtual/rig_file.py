@@ -190,6 +190,8 @@ def _unsound(rig: Rig) -> Iterable[Finding]:
         where = f"sensors.{name}"
         if sensor.bits and not (sensor.span or sensor.range):
             yield Finding("has bits and neither span nor range", f"{where}.bits", "state span: 10 V")
+        if sensor.span and not sensor.bits:
+            yield Finding("is a span without bits", f"{where}.span", "state bits: 16")
         if sensor.per_turn and not sensor.measures.startswith("rate:"):
             yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
 

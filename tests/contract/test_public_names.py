@@ -98,6 +98,7 @@ WRONG = {
     ),
     "a path for a mechanism": (lambda m: trunnion.simulate("a.yaml"), TypeError, r"Mechanism: trunnion.read\(FILE\)"),
     "a time with its unit": (lambda m: trunnion.simulate(m, "1 s"), TypeError, r"duration='1 s'\) takes float"),
+    "one too many": (lambda m: m.with_values({}, 3, 4, 5), TypeError, r"with_values\(\): too many positional"),
     "a number for a function": (lambda m: trunnion.analyse(m, progress=3), TypeError, "takes Callable"),
     "pairs for a mapping": (lambda m: m.with_values([("r", 1)]), TypeError, r"with_values\(values=.*takes Mapping"),
     "points for a file": (lambda m: m.with_table("A", [(0, 0)]), TypeError, r"takes str \| PathLike"),

@@ -55,6 +55,7 @@ BAD = {
     "an empty value": (["--over", "AB=1m,,2m"], "AB"),
     "unknown name": (["--over", "AX=1m,2m"], "no number named 'AX'"),
     "one without unit": (["--over", "AB=1000:2m:3"], "1000.0 has no unit"),
+    "a count of 1": (["--over", "AB=1m:2m:1"], "AB: 1m:2m:1 is not from, to and a count of 2 or more"),
     "too many": (["--over", "AB=1m:2m:100001"], "100,001 points"),
     "impossible": (["--over", "crank.mass=1kg,-1kg"], "negative"),
     "unknown measure": (["--over", "AB=1m,2m", "--measure", "efficency"], "did you mean 'efficiency'"),

@@ -111,6 +111,7 @@ MISTAKES = {
             ("friction: {pair_factor: 1}", "friction", "needs 'coefficient'")],
         "links: [ground, crank]}": [
             ("links: [ground, crank], pin: {fit: 20 mm}}", "joints.A.pin.fit", "'20 mm' is not a fit"),
+            ("links: [ground, crank], pin: {fit: H7/g6}}", "joints.A.pin.fit", "'H7/g6' states no diameter"),
             ("links: [ground, crank], pin: {fit: 20H7/g6}}", "joints.A.pin.fit", "'20' has no unit"),
             ("links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}",
              "joints.A.pin.fit", "beside radius")],
@@ -297,6 +298,9 @@ EXACTLY = [
     (FOURBAR, [("links: [crank, coupler]", "link: [crank, coupler]")], ["joints.B", "joints.B.link"]),
     (FOURBAR, [("radius: 7.5 mm", "diameter: 15 mm")], ["joint_defaults.pin.diameter"]),
     (FOURBAR, [("friction: 0.1", "friction: off")], ["joint_defaults.friction.coefficient"]),
+    (FOURBAR, [("  pin: {radius: 7.5 mm}\n", ""), ("  friction: 0.1\n", "  seat: free\n"),
+               ("links: [ground, crank]}", "links: [ground, crank], friction: none}")],
+     ["joints.A.friction.coefficient"]),
     (FOURBAR, [("measures:", SPRING)], ["springs.s.stifness"]),
     # and hides nothing else
     (FOURBAR, [("mass: 4.8 kg", "mass: -1\n    centre: [1, 0]"), ("friction: 0.1", "friction: -1")],

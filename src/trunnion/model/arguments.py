@@ -90,7 +90,10 @@ def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
     def strict(*args: Any, **keywords: Any) -> Any:
         if closed:
             check_keywords(f"{call}()", keywords, names)
-        bound = signature.bind_partial(*args, **keywords)
+        try:
+            bound = signature.bind_partial(*args, **keywords)
+        except TypeError as error:  # too many of them, or one twice
+            raise TypeError(f"{call}(): {error}") from None
         for name, value in bound.arguments.items():
             bound.arguments[name] = held(call, name, value, meaning(name))
         return function(*bound.args, **bound.kwargs)

@@ -42,7 +42,7 @@ JointType = Annotated[str, OneOf(PAIRS, "joint type")]
 Pitch = Annotated[Length, NotZero("the thread does not advance")]
 
 
-_FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
+_FIT = re.compile(r"^(?P<size>(?:.*[^\sA-Z])?)\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,8 @@ class Fit:
         match = _FIT.match(source.strip()) if isinstance(source, str) else None
         if not isinstance(source, str) or not match:
             raise problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
+        if not match["size"]:
+            raise problem(f"{source!r} states no diameter", "write it before the classes, as 20 mm H7/g6")
         try:
             size = Quantity.read(match["size"], KINDS["length"])
         except UnitError as error:

@@ -112,7 +112,8 @@ def grid(mechanism: Mechanism, over: Over) -> tuple[Swept, ...]:
         if isinstance(values, tuple):
             count = values[-1] if len(values) == 3 else 0
             if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 2:
-                raise MechanismError(Finding(f"{values} is not from, to and a count of 2 or more", name, remedy))
+                what = f"{':'.join(map(str, values))} is not from, to and a count of 2 or more"
+                raise MechanismError(Finding(what, name, remedy))
         elif not count:
             raise MechanismError(Finding("has no values", name, remedy))
         counts.append(int(count))

@@ -285,16 +285,16 @@ def shape(draw):
 @given(
     seed=st.integers(0, 2**31 - 1),
     order=st.sampled_from(["xyz", "zyx", "XYZ", "zxz", "ZYx"]),
-    source=st.sampled_from(["auto", "true"]),
+    masses=st.sampled_from(['inertiafromgeom="true"', 'settotalmass="7.5"', 'inertiagrouprange="1 3"', ""]),
 )
-def test_any_frame_and_shape_is_where_mujoco_has_it(seed, order, source, tmp_path_factory):
+def test_any_frame_and_shape_is_where_mujoco_has_it(seed, order, masses, tmp_path_factory):
     mujoco = pytest.importorskip("mujoco")
     draw = np.random.default_rng(seed)
     axes = [row(draw.normal(size=3)) for _ in range(4)]
-    text = f"""<mujoco><compiler eulerseq="{order}" inertiafromgeom="{source}"/>
-<default><geom density="500"/><default class="light"><geom density="20"/></default></default>
+    text = f"""<mujoco><compiler eulerseq="{order}" {masses}/>
+<default><geom density="500" group="1"/><default class="light"><geom density="20"/></default></default>
 <worldbody><body name="a" {placed(draw)}>
-  <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(draw)}{shape(draw)}
+  <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(draw)}{shape(draw)}<geom size="0.2" group="4"/>
   <frame {placed(draw)}><frame {placed(draw)}>{shape(draw)}
     <body name="b" {placed(draw)}><joint name="B" type="slide" axis="{axes[1]}"/>{shape(draw)}
       <body name="c" {placed(draw)}><inertial {placed(draw)} mass="2" diaginertia="1 2 2.5"/>

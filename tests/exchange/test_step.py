@@ -82,7 +82,15 @@ def shapes(split):
     cross = box((-10, -10, -10), (10, 10, 10), split)
     cross.feature(1, (10, 0, 0), [(6, 0), (5, 1, (6, 1)), (5, 10), (4, 11), (0, 11)])
     cross.feature("top", (2, 3, 10), [(3, 0), (3, -5), (0, -7)])
+    root, tube = math.sqrt(3), (10, 3)  # an O-ring, whose moments are those of three pieces: one face, with its seams
+    ring = turned([(12, 3), (9, 3 + root, tube), (9, 3 - root, tube), (12, 3, tube)], origin=(3, 2, -2), split=split)
+    middle, up, across, start = np.array([3, 2, 1.0]), np.eye(3)[2], np.eye(3)[1], np.array([15, 2, 1.0])
+    seams = [("circle", middle, up, 12, start, start), ("circle", start - [2, 0, 0], -across, 2, start, start)]
+    seams += [(kind, at, -axis, *rest) for kind, at, axis, *rest in seams]
+    loops = [] if split == "none" else [seams]
+    ring.faces = [{"surface": ("TOROIDAL_SURFACE", middle, up, 10, 2), "sense": True, "loops": loops}]
     return {
+        "ring": ring,
         "cross": cross,
         "pin": turned([(0, 0), (5, 0), (6, 1), (6, 30), (4, 32, (4, 30)), (4, 40), (0, 44, (0, 40))], split=split),
         "cone": turned([(0, 0), (6, 0), (0, 10)], (1, 1, 0), (3, 2, 1), split),
@@ -132,6 +140,21 @@ def test_turned_shifted_and_mirrored_parts(tmp_path_factory, axis, angle, shift,
         1e-9,
         1e-7,
     )
+
+
+def test_a_solid_that_is_not_read_exactly_is_left_to_its_mesh(tmp_path, monkeypatch):
+    """A loop of another kind is a doubt, not a hole that is none; what the mesh came to is said as it is."""
+    path = written(tmp_path / "a.step", {"plate": (plate(), *STILL), "pin": (shapes("seam")["pin"], *STILL)})
+    path.write_text(path.read_text().replace("MANIFOLD_SOLID_BREP", "FACETED_BREP"))
+    assert set(import_file(path).bodies) == {"plate", "pin"}
+    path.write_text(re.sub(r"EDGE_LOOP\('',\(.*?\)\)", "POLY_LOOP('',())", path.read_text()))
+    meshed = subprocess.CompletedProcess([], 0, "[0, [0, 0, 0], [[0, 0, 0], [0, 0, 0], [0, 0, 0]]]\n" * 2)
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: meshed)
+    draft = import_file(path)
+    assert set(draft.bodies) == {"plate", "pin"}
+    said = "".join(finding.what for finding in draft.findings)
+    assert "a loop POLY_LOOP" in said
+    assert "encloses no volume" in said
 
 
 # ---- assemblies as they are drawn ---------------------------------------------------------------------------------

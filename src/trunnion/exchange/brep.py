@@ -37,7 +37,8 @@ _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})+)\\X0\\|\\X\\([0-9A-F]{2})|\\S\\(.)"
 Entity = dict[str, list[Any]]  # kind → arguments
 GAUSS = np.polynomial.legendre.leggauss(12)  # along an edge, a piece of at most 45°
 INNER = np.polynomial.legendre.leggauss(24)  # across a face: exact for powers, 1e-14 for a full turn of a torus
-CLOSED = 1e-6  # rad: an arc shorter than this is a full turn; of a spline, by which its ends may miss its vertices
+CLOSED = 1e-9  # rad: an arc shorter than this is a full turn
+MISSED = 1e-6  # of a spline, by which its ends may miss its vertices
 KINDS = {
     "PLANE": "plane",
     "CYLINDRICAL_SURFACE": "cylinder",
@@ -320,7 +321,7 @@ class Geometry:
                 return place, (dh[:, :3] - place * dh[:, 3:]) / h[:, 3:]
 
             breaks = np.unique(knots)[:: 1 if same else -1]
-            if not closed and np.abs(drawn(breaks[[0, -1]])[0] - ends).max() > CLOSED * np.ptp(points, axis=0).max():
+            if not closed and np.abs(drawn(breaks[[0, -1]])[0] - ends).max() > MISSED * np.ptp(points, axis=0).max():
                 raise UnreadError("a part of a spline")
             return _gauss(drawn, breaks)
         if kind not in ("CIRCLE", "ELLIPSE"):
@@ -341,8 +342,11 @@ class Geometry:
 
     def loop(self, number: Any) -> list[tuple[Array, Array, Array, int, bool]]:
         """The edges of a loop in its order: nodes, tangents, ends, number and whether it runs along its edge."""
+        kind = self.file.kind(number)
+        if kind not in ("EDGE_LOOP", "VERTEX_LOOP"):
+            raise UnreadError(f"a loop {kind}")
         edges = []  # none of a vertex loop, which bounds a whole sphere or torus
-        for oriented in self.file[number].get("EDGE_LOOP", ["", []])[1]:
+        for oriented in self.file.args(number, kind)[1] if kind == "EDGE_LOOP" else ():
             *_, edge, along = self.file.args(oriented, "ORIENTED_EDGE")
             nodes, tangents, ends = self.edge(edge)
             edges.append((nodes, tangents if along else -tangents, ends, int(edge), bool(along)))
@@ -363,7 +367,7 @@ class Geometry:
         return Face(KINDS[kind], frame, origin, radius, outward, face, minor)
 
     def solid(self, number: int) -> Solid:
-        """A MANIFOLD_SOLID_BREP or BREP_WITH_VOIDS."""
+        """A MANIFOLD_SOLID_BREP, BREP_WITH_VOIDS or FACETED_BREP."""
         kind = self.file.kind(number)
         args = self.file[number][kind]
         shells = [(args[1], True)]
@@ -410,10 +414,14 @@ class Geometry:
             return
         area, moments = _integrals(face, loops)
         face.area = area if face.outward else -area
-        if face.kind == "sphere" and face.area <= 1e-12 * face.radius**2:  # its loops bound what is cut out of a ball
-            face.area += 4 * math.pi * face.radius**2
-            volume, at = 4 / 3 * math.pi * face.radius**3, face.origin
-            second = volume * (np.outer(at, at) + face.radius**2 / 5 * np.eye(3))
+        if face.kind in ("sphere", "torus") and face.area <= 1e-12 * face.radius**2:  # loops of what is cut out of it
+            r, a, at = face.radius, face.minor, face.origin
+            full, volume, squares = 4 * math.pi * r**2, 4 / 3 * math.pi * r**3, np.full(3, r**2 / 5)
+            if face.kind == "torus":
+                full, volume = 4 * math.pi**2 * r * a, 2 * math.pi**2 * r * a**2
+                squares = np.array([r**2 / 2 + 3 / 8 * a**2, r**2 / 2 + 3 / 8 * a**2, a**2 / 4])
+            face.area += full
+            second = volume * (np.outer(at, at) + face.frame.T @ np.diag(squares) @ face.frame)
             moments = moments + (1.0 if face.outward else -1.0) * moments_of(volume, volume * at, second)
         if not face.area > 0:
             solid.doubts.append("it has faces whose bounds run the wrong way round")
@@ -445,7 +453,7 @@ def _integrals(face: Face, loops: list[tuple[Array, Array]]) -> tuple[float, Arr
     """∬ |n| and the moments by the divergence theorem over the part of a surface that loops bound.
 
     Both have the sign of the loops: positive if they run counter-clockwise as the surface's own normal sees them. Of a
-    sphere they are determined but for a multiple of the closed surface; a whole torus is not read.
+    sphere or torus they are determined but for a multiple of the closed surface.
     """
     if not loops:
         return 0.0, np.zeros((4, 4))

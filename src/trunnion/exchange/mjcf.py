@@ -72,9 +72,10 @@ def read(path: Path, options: ImportOptions) -> Draft:
     for tag in BRINGS:
         if root.find(f".//{tag}") is not None:
             draft.lose(f"<{tag}> and the bodies in it, which MuJoCo writes in full when it saves the model")
-    for attribute in ("settotalmass", "inertiagrouprange"):
-        if attribute in reader.compiler:
-            draft.lose(f"{attribute} of the compiler")
+    total = number(reader.compiler.get("settotalmass"), "settotalmass", -1)
+    mass = sum(body.mass for body in draft.bodies.values())
+    for body in draft.bodies.values() if total > 0 and mass > 0 else ():
+        body.mass, body.inertia = body.mass * total / mass, body.inertia * total / mass
     return reader.settled(WORLD, options.ground)
 
 
@@ -228,6 +229,8 @@ class _Reader(Scene):
         density = number(values.get("density"), f"density {of}", 1000)
         weightless = mass_stated == 0 or (mass_stated is None and density == 0)
         weightless |= self.compiler.get("inertiafromgeom") == "false"
+        low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
+        weightless |= not low <= number(values.get("group"), f"group {of}", 0) <= high
         if name in self.weighed or kind in ("plane", "hfield") or weightless:
             return
         count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)

@@ -195,9 +195,9 @@ def _meshed(file: Part21, solid: Solid) -> tuple[Array, str]:
                 for volume, first, second in map(json.loads, done.stdout.splitlines()[-2:])
             )
         except (subprocess.SubprocessError, ValueError):
-            coarse = fine = np.zeros((4, 4))
+            return np.zeros((4, 4)), "not found: it needs the extra 'cad', or has no mesh within a minute"
     if not fine[0, 0] > 0:
-        return np.zeros((4, 4)), "not found: it needs the extra 'cad', or has no mesh within a minute"
+        return np.zeros((4, 4)), "not found: its mesh encloses no volume"
     return fine, f"by a mesh, to about {abs(coarse[0, 0] / fine[0, 0] - 1) / 3:.1g}"
 
 

@@ -33,6 +33,11 @@ def draw(space, layer, marks):
             space.add_line(*numbers, dxfattribs=here)
         elif kind == "circle":
             space.add_circle(*numbers, dxfattribs=here)
+        elif kind == "halves":  # a circle as two arcs
+            space.add_arc(*numbers, 10, 190, dxfattribs=here)
+            space.add_arc(*numbers, 190, 10, dxfattribs=here)
+        elif kind == "ellipse":
+            space.add_ellipse(numbers[0], (0, numbers[1]), 1.0, dxfattribs=here)
         elif kind == "point":
             space.add_point(*numbers, dxfattribs=here)
         elif kind == "text":
@@ -67,8 +72,11 @@ def codes(draft):
     return sorted(finding.code.removeprefix("exchange.") for finding in draft.findings)
 
 
-def test_concentric_circles_of_two_layers_are_a_joint_with_pin_hole_and_name(tmp_path):
-    draft = read(drawing(**four_bar()), tmp_path)
+@pytest.mark.parametrize("circle", ["circle", "halves", "ellipse"])
+def test_concentric_circles_of_two_layers_are_a_joint_with_pin_hole_and_name(circle, tmp_path):
+    marks = {layer: [(circle, *mark[1:]) if mark[0] == "circle" else mark for mark in drawn]
+             for layer, drawn in four_bar().items()}  # fmt: skip
+    draft = read(drawing(**marks), tmp_path)
     assert {name: pair.links for name, pair in draft.pairs.items()} == FOUR_BAR
     for name, place in zip("ABCD", (A, B, C, D), strict=True):
         pair = draft.pairs[name]

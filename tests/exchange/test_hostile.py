@@ -25,7 +25,7 @@ from exchange.test_linkages import FOUR_BAR, PMKS
 from exchange.test_mesh import BOX, CORNERS, FACES, model_3mf, packed, solid, stl
 from exchange.test_robots import MJCF, OLD_SDF, SDF, URDF
 from trunnion.errors import MechanismError
-from trunnion.exchange import import_file, model_text
+from trunnion.exchange import import_file, linkages, model_text
 
 logging.getLogger("ezdxf").disabled = True  # it quotes damaged text, which xdist cannot send
 BOXED, ITEM = solid(1, BOX * CORNERS, FACES), '<item objectid="1"/>'
@@ -273,3 +273,15 @@ def test_a_hostile_file_is_one_sentence(suffix, kind, tmp_path):
     (finding,) = error.value.findings
     assert str(finding).startswith(str(path))
     assert len(finding.what) < 400
+
+
+def test_a_mistake_of_this_program_is_no_damage_of_the_file(tmp_path, monkeypatch):
+    """It goes on as it is; what a library raises at a file is a sentence, with its cause."""
+    path = sound(".pmks", tmp_path)
+    monkeypatch.delattr(linkages, "CHECKS")
+    with pytest.raises(NameError):
+        import_file(path)
+    monkeypatch.setattr(linkages, "CHECKS", None, raising=False)
+    with pytest.raises(MechanismError, match="is damaged") as raised:
+        import_file(path)
+    assert isinstance(raised.value.__cause__, TypeError)

@@ -201,6 +201,16 @@ def test_a_slider_of_pylinkage_is_a_pin_on_a_line(tmp_path):
 def test_joints_without_a_place_of_their_own_or_too_many_are_refused(tmp_path):
     twice = {**FOUR_BAR, "joints": [*FOUR_BAR["joints"], FOUR_BAR["joints"][1]]}
     many = {"joints": [{"id": str(k), "type": "revolute", "position": [k, 0]} for k in range(100_000)], "links": []}
-    for data, says in ((twice, "two joints of the same name"), (many, "at most 2,000")):
+    first, *others = FOUR_BAR["links"]
+    strange = {**FOUR_BAR, "links": [{**first, "joints": ["zz"]}, *others]}
+    bare = {**FOUR_BAR, "links": [{key: value for key, value in first.items() if key != "joints"}, *others]}
+    for data, says in (
+        (twice, "two joints of the same name"),
+        (many, "at most 2,000"),
+        (strange, "'zz' is no joint of the file"),
+        (bare, f"{first['id']!r} without 'joints'"),
+        ({**FOUR_BAR, "links": ["?"]}, "no joints and links"),
+        ([], "no joints and links"),
+    ):
         with pytest.raises(MechanismError, match=says):
             import_file(written(data, tmp_path))

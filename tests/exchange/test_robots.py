@@ -1,6 +1,7 @@
 """MJCF, SDF and URDF: out and in again, against MuJoCo, and files as others write them."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,11 @@ def test_a_screw_is_a_screw_again(suffix, tmp_path):
     assert again.effective_joints["B"].type == "helical"
     assert again.parameters()["joints.B.pitch"] == pytest.approx(-6e-3, rel=1e-12)
     same_power(stated, again)
+    if suffix == ".sdf":  # as older files have it: rad/m, left-handed
+        older = f"<thread_pitch>{2 * math.pi / 6e-3!r}</thread_pitch>"
+        text = re.sub(r"<screw_thread_pitch>.*?</screw_thread_pitch>", older, (tmp_path / "again.sdf").read_text())
+        (tmp_path / "old.sdf").write_text(text)
+        assert import_file(tmp_path / "old.sdf").pairs["B"].pitch == pytest.approx(-6e-3, rel=1e-12)
 
 
 JOINTS = {  # type and direction of joints of a body in a row, and the axis of the pair that they make
@@ -294,7 +300,8 @@ def test_any_frame_and_shape_is_where_mujoco_has_it(seed, order, masses, tmp_pat
     text = f"""<mujoco><compiler eulerseq="{order}" {masses}/>
 <default><geom density="500" group="1"/><default class="light"><geom density="20"/></default></default>
 <worldbody><body name="a" {placed(draw)}>
-  <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(draw)}{shape(draw)}<geom size="0.2" group="4"/>
+  <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(draw)}{shape(draw)}
+  <geom size="0.2" group="4"/>
   <frame {placed(draw)}><frame {placed(draw)}>{shape(draw)}
     <body name="b" {placed(draw)}><joint name="B" type="slide" axis="{axes[1]}"/>{shape(draw)}
       <body name="c" {placed(draw)}><inertial {placed(draw)} mass="2" diaginertia="1 2 2.5"/>
@@ -371,13 +378,14 @@ def link_sdf(name, pose, mass, centre, inertia):
 
 DRIVE = """<plugin name="x::JointController" filename="y"><joint_name>A</joint_name>
 <initial_velocity>10</initial_velocity></plugin>"""
+QUATERNION = f'rotation_format="quat_xyzw">0 0 0 0 0 {math.sin(ROCKER / 2)!r} {math.cos(ROCKER / 2)!r}'
 SDF = f"""<?xml version="1.0"?><sdf version="1.9"><world name="w"><gravity>0 0 -9.81</gravity>
 <model name="four-bar"><pose degrees="true">0.5 -0.2 0.3 90 0 0</pose>
 <frame name="right" attached_to="bench"><pose>0.2 0 0 0 0 0</pose></frame>
 {link_sdf("bench", "", 3, "0 0", 1)}
 {link_sdf("crank", f'<pose relative_to="bench">0 0 0 0 0 {CRANK!r}</pose>', 0.4, "0.03 0", 3e-4)}
 {link_sdf("coupler", f'<pose relative_to="crank">{AB!r} 0 0 0 0 {COUPLER - CRANK!r}</pose>', 0.9, "0.08 0.01", 2e-3)}
-{link_sdf("rocker", f'<pose relative_to="right">0 0 0 0 0 {ROCKER!r}</pose>', 0.7, "0.05 0", 1e-3)}
+{link_sdf("rocker", f'<pose relative_to="right" {QUATERNION}</pose>', 0.7, "0.05 0", 1e-3)}
 <joint name="floor" type="fixed"><parent>world</parent><child>bench</child></joint>
 <joint name="A" type="revolute"><parent>bench</parent><child>crank</child><axis><xyz>0 0 1</xyz></axis></joint>
 <joint name="B" type="revolute"><parent>crank</parent><child>coupler</child>

@@ -68,6 +68,11 @@ class Slot(Line):
         along, aside = off @ self.span / self.length, abs(_cross(self.span, off)) / self.length
         return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
 
+    def completes(self, other: Slot) -> bool:
+        """Whether two half circles of a layer run between the same ends, the other way."""
+        apart = np.linalg.norm([*(self.start - other.end), *(self.end - other.start), self.half - other.half])
+        return self.layer == other.layer and float(apart) < HALF * other.half
+
 
 def read(path: Path, options: ImportOptions) -> Draft:
     """The links and joints of a drawing.
@@ -143,6 +148,14 @@ class Sketch:
                 if key not in names:
                     names[key] = free_name(layer, names.values())
                 self._add(names[key], entity)
+        halves, self.halves = self.halves, []
+        for half in halves:  # two half arcs about one centre, which is how some programs draw a circle, are a circle
+            other = next((other for other in self.halves if half.completes(other)), None)
+            if other is None:
+                self.halves.append(half)
+            else:
+                self.halves.remove(other)
+                self.circles.append((half.layer, (half.start + half.end) / 2, half.half))
 
     def _entities(self, entities: Iterable[Any], inserted: str, depth: int) -> Iterator[tuple[str, Any]]:
         """Lines, arcs, circles, points and texts with their layers, blocks and polylines taken apart.
@@ -176,7 +189,7 @@ class Sketch:
             self.heights.append(self.unit * point.z)
             return self.unit * np.array([point.x, point.y])
 
-        if kind in ("CIRCLE", "ARC") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
+        if kind in ("CIRCLE", "ARC", "ELLIPSE") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
             kind = f"tilted {kind}"
         sweep = dxf.end_angle - dxf.start_angle if kind == "ARC" else 0.0
         if kind == "LINE":
@@ -187,6 +200,10 @@ class Sketch:
             self.circles.append((layer, place(dxf.location), 0.0))
         elif kind == "ARC" and abs(sweep % 360 - 180) < math.degrees(HALF):
             self.halves.append(Slot(layer, place(entity.start_point), place(entity.end_point), self.unit * dxf.radius))
+        elif (
+            kind == "ELLIPSE" and abs(dxf.ratio - 1) < TOUCH and abs(dxf.end_param - dxf.start_param - math.tau) < HALF
+        ):
+            self.circles.append((layer, place(dxf.center), self.unit * dxf.major_axis.magnitude))  # of a scaled block
         elif kind in ("TEXT", "ATTRIB"):
             self.texts.append((layer, place(entity.get_placement()[1]), entity.plain_text()))
         elif kind == "MTEXT" and "\n" not in entity.plain_text().strip():

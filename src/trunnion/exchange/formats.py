@@ -10,6 +10,7 @@ import os
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 LINKS = "http:/", "https:/"  # how a path begins that is a link: its text is read, nothing is fetched
 FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read
+BUGS = (NameError, AttributeError, AssertionError)
 
 
 @dataclass(frozen=True)
@@ -162,8 +164,11 @@ def import_file(
     except (RecursionError, MemoryError):
         raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
     except Exception as error:  # a library raises anything at a damaged file
+        frame = [frame for frame, _ in walk_tb(error.__traceback__)][-1]
+        if isinstance(error, BUGS) and frame.f_globals.get("__name__", "").startswith("trunnion."):
+            raise  # our own mistake, not the file's
         what = printable(f"is damaged, or not as its format has it: {type(error).__name__} {error}")
-        raise MechanismError(Finding(what, remedy="mend the file, or export it again", file=str(path))) from None
+        raise MechanismError(Finding(what, remedy="mend the file, or export it again", file=str(path))) from error
     draft.source = draft.source or path.name
     draft.name = draft.name or path.stem
     return complete(draft.checked(), ground, drive, rate, turns)

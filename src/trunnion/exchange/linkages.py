@@ -20,6 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from trunnion.exchange.draft import Array, Body, Draft, ImportOptions, Pair, few, free_name, refused
+from trunnion.model.names import nearest
 
 GROUND = "ground"
 MOST = 2000  # pins and bars of a linkage
@@ -245,12 +246,16 @@ def _pins(
 WRITTEN = "write it with pylinkage.mechanism.mechanism_to_json"
 
 
-def _of_pylinkage(data: Any, options: ImportOptions) -> Draft:
-    """The draft of a mechanism: links name their joints, a tracker is a point of the link that has both its joints."""
-    joints = data["joints"]
-    few(len(joints), MOST, "joints")
-    draft = Draft(str(data.get("name") or ""), {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
-    unit, pins = draft.assumed_unit(options), dict[str, PlanarPin]()
+class _Part(dict[str, Any]):
+    """A joint or link of the file, which says what it lacks."""
+
+    def __missing__(self, key: str) -> Any:
+        raise refused(f"has {str(self.get('id', 'a joint or link'))!r} without {key!r}", "", WRITTEN)
+
+
+def _joint_pins(joints: Sequence[Record], unit: float) -> dict[str, PlanarPin]:
+    """The pins of the joints, by their names."""
+    pins = dict[str, PlanarPin]()
     for joint in joints:
         name, place = joint["id"], joint["position"]
         if any(part is None for part in place):
@@ -262,19 +267,37 @@ def _of_pylinkage(data: Any, options: ImportOptions) -> Draft:
             pins[name].carrier, pins[name].direction = GROUND, [float(part) for part in joint["axis"]]
     if len(pins) < len(joints):
         raise refused("has two joints of the same name", "", WRITTEN)
-    for link in data["links"]:
+    return pins
+
+
+def _of_pylinkage(data: Any, options: ImportOptions) -> Draft:
+    """The draft of a mechanism: links name their joints, a tracker is a point of the link that has both its joints."""
+    rows: list[Any] = [data.get(key) if isinstance(data, dict) else None for key in ("joints", "links")]
+    if not all(isinstance(row, list) and all(isinstance(part, dict) for part in row) for row in rows):
+        raise refused("has no joints and links of pylinkage", "", WRITTEN)
+    joints, links = ([_Part(part) for part in row] for row in rows)
+    few(len(joints), MOST, "joints")
+    draft = Draft(str(data.get("name") or ""), {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
+    pins = _joint_pins(joints, draft.assumed_unit(options))
+
+    def pin_of(name: Any) -> PlanarPin:
+        if name not in pins:
+            raise refused(f"{name!r} is no joint of the file", "joints", nearest(str(name), pins))
+        return pins[name]
+
+    for link in links:
         kind, name = link.get("type", "link"), GROUND
         if kind != "ground" and link["id"] != data.get("ground"):
             name = free_name(str(link.get("name") or link["id"]), draft.bodies)
             draft.bodies[name] = Body(name)
-        for pin in (pins[joint] for joint in link["joints"]):
+        for pin in map(pin_of, link["joints"]):
             pin.bodies += [name] * (name != pin.carrier)  # the frame has the line that a slider is on
         if kind in ("driver", "arc_driver") and link.get("motor_joint"):
-            pins[link["motor_joint"]].drive = 0.0
-    for joint in data["joints"]:
+            pin_of(link["motor_joint"]).drive = 0.0
+    for joint in joints:
         if joint.get("type") == "ground":
             pins[joint["id"]].bodies.append(GROUND)
-    for joint in (joint for joint in data["joints"] if joint.get("type") == "tracker"):
-        first, second = (pins[joint[f"ref_joint{number}_id"]].bodies for number in (1, 2))
+    for joint in (joint for joint in joints if joint.get("type") == "tracker"):
+        first, second = (pin_of(joint[f"ref_joint{number}_id"]).bodies for number in (1, 2))
         pins[joint["id"]].bodies += [name for name in first if name in second][:1]
     return _meet(draft, list(pins.values()))

@@ -200,7 +200,11 @@ class _Reader(Scene):
             if abs(pair.axis @ pair.second_axis) > PARALLEL:
                 raise refused("turns about two axes that are not square to each other", where, "write two joints")
         if pair.type == "helical":
-            pair.pitch = number(part.findtext("screw_thread_pitch"), f"screw_thread_pitch of {where}")
+            pitch, old = part.findtext("screw_thread_pitch"), part.findtext("thread_pitch")
+            if pitch is None and old is not None:  # rad/m, left-handed
+                pair.pitch = -2 * np.pi / (number(old, f"thread_pitch of {where}") or np.inf)
+            else:
+                pair.pitch = number(pitch, f"screw_thread_pitch of {where}")
         return pair
 
     def _axis(self, part: Element, tag: str, where: str, prefix: str) -> Array:
@@ -236,6 +240,9 @@ def _pose(pose: Element | None, name: str) -> Place:
     if pose is None or not (pose.text or "").strip():
         return Place()
     where = f"pose of {name}"
+    if pose.get("rotation_format") == "quat_xyzw":
+        values = numbers(pose.text, where, 7)
+        return Place(Rotation.from_quat(unit(values[3:], where)).as_matrix(), values[:3])
     values = numbers(pose.text, where, 6)
     turns = Rotation.from_euler("xyz", values[3:], degrees=pose.get("degrees") in YES)
     return Place(turns.as_matrix(), values[:3])

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -22,12 +21,12 @@ Run = Callable[..., Outcome]
 
 
 @pytest.fixture
-def program(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+def program(monkeypatch, capsys, tmp_path):
     """The program, in this process, in an empty folder and a terminal of 160 columns; a thin space is a space."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "160")
 
-    def call(*arguments: object) -> Outcome:
+    def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["trunnion", *map(str, arguments)])
         capsys.readouterr()
         code = 0

@@ -227,3 +227,12 @@ def alone(mechanism: Mechanism, values: Mapping[str, Any], i: int) -> Mechanism:
         one.direction for one in mechanism.tolerated() if one.direction
     ]
     return numbers(mechanism, {path: float(np.ravel(values[path])[i]) for path in paths})
+
+
+# a mechanism, its closed form and its sizes
+CASES = {
+    "clutch": (clutch, clutch_angle, CLUTCH),
+    "four-bar": (fourbar, fourbar_angle, FOURBAR),
+    "slider-crank": (slider_crank, slider_place, SLIDER),
+    "RSSR": (rssr, rssr_angle, RSSR),
+}

@@ -7,32 +7,11 @@ import pytest
 from scipy import stats
 
 import trunnion
-from toleranced import (
-    CLUTCH,
-    FOURBAR,
-    RSSR,
-    SLIDER,
-    clutch,
-    clutch_angle,
-    fourbar,
-    fourbar_angle,
-    rssr,
-    rssr_angle,
-    sampler,
-    slider_place,
-    slopes,
-)  # fmt: skip
-from toleranced import slider_crank as sized_slider
+from toleranced import CASES, FOURBAR, fourbar, fourbar_angle, rssr, sampler, slopes
 from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.linear import study
 
 FAST = ("linear", "worst-case")
-CASES = {
-    "clutch": (clutch, clutch_angle, CLUTCH),
-    "four-bar": (fourbar, fourbar_angle, FOURBAR),
-    "slider-crank": (sized_slider, slider_place, SLIDER),
-    "RSSR": (rssr, rssr_angle, RSSR),
-}
 MM = 1e3  # of a derivative by a length, m⁻¹ in mm⁻¹
 
 

@@ -23,6 +23,12 @@ MODEL = trunnion.Mechanism.model_validate(FOUR_BAR).with_values({"CD": "85 mm"})
 
 TURN = 2 * np.pi * np.arange(360) / 360
 LOADED = {**FOUR_BAR, "loads": {"brake": {"joint": "D", "resisting_torque": "20 N m", "useful": True}}}
+MAPPING = {
+    "trunnion-data": 1,
+    "time": {"column": "t", "unit": "s"},
+    "angle": {"from": "column", "column": "a", "unit": "deg"},
+    "set": {"A.speed": "60 rpm"},
+}
 RATES = {"M": {"column": "M", "measures": "effort:A", "unit": "N m"}, "psi": CHANNELS["psi"]}
 
 
@@ -35,14 +41,7 @@ def braked(folder, zero):
     columns = [rows / 500, np.degrees(crank) - zero, 20 * np.abs(slope) + random.normal(0, 0.05, rows.size),
                np.degrees(rocker(crank)) + random.normal(0, 0.1, rows.size)]  # fmt: skip
     np.savetxt(folder / "a.csv", np.column_stack(columns), "%.5f", ",", header="t,a,M,psi", comments="")
-    stated = {
-        "trunnion-data": 1,
-        "time": {"column": "t", "unit": "s"},
-        "angle": {"from": "column", "column": "a", "unit": "deg"},
-        "channels": RATES,
-        "set": {"A.speed": "60 rpm"},
-    }
-    return read_measured(stated, [folder / "a.csv"])
+    return read_measured(MAPPING | {"channels": RATES}, [folder / "a.csv"])
 
 
 @pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "60 Hz"}}])
@@ -58,15 +57,7 @@ def test_angles_that_begin_anew_or_count_on_have_the_same_course_in_every_turn(t
     of_crank = {"measures": "rotation:A", "unit": "deg"}
     channels = {"psi": {**CHANNELS["psi"], "zero": f"{-start} deg"}, "anew": {"column": "a", **of_crank},
                 "on": {"column": "n", **of_crank}}  # fmt: skip
-    stated = {
-        "trunnion-data": 1,
-        "time": {"column": "t", "unit": "s"},
-        "angle": {"from": "column", "column": "a", "unit": "deg"},
-        "channels": channels,
-        "set": {"A.speed": "60 rpm"},
-        **low_pass,
-    }
-    data = read_measured(stated, [tmp_path / "a.csv"])
+    data = read_measured(MAPPING | {"channels": channels, **low_pass}, [tmp_path / "a.csv"])
     for name, true in (("psi", rocker(TURN)), ("anew", TURN), ("on", TURN)):
         turns = data.conditions[0].courses[name].turns
         assert np.nanmax(np.ptp(turns, axis=0)) < np.radians(0.2)

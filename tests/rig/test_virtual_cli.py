@@ -61,7 +61,7 @@ sensors:
         ("1 kHz", "fast", 3, "not a number", "12.5 mV"),
         ("per_turn: 60", "per_turn: 0", 4, "greater than or equal to 1", ""),
         ("trunnion-rig: 1", "trunnion-rig: 2", 1, "version 2", "trunnion-rig: 1"),
-        ("trunnion-rig: 1", "trunnion: 1", 1, "'trunnion-rig' is missing", ""),
+        ("trunnion-rig: 1", "trunnion: 1", 1, "is no rig file but a model file", "name a rig file"),
         ("range: 10 N m", "range: -10 N m", 6, "is not above zero", "above"),
         ("range: 10 N m", "bits: 12", 6, "neither span nor range", "span"),
         ("range: 10 N m", "span: 10 N m", 6, "is a span without bits", "bits: 16"),

@@ -7,9 +7,12 @@ mechanism, and of these the Draft at a position. Places are in m, in the global 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
+from pathlib import Path
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,12 +37,32 @@ MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass":
 FARTHEST = 1e9  # m; what lies farther is a mistake of the file
 PARALLEL = 1e-6  # rad, between axes that count as parallel
 LENGTHS = "pin.bearing", "pin.length", "guide.length"  # of a bearing: the first that is stated
+BUGS = (NameError, AttributeError, AssertionError)  # of the program, not of a file
 CYCLE = 720  # positions at which the stroke of a driven slide is looked for
 
 
 def refused(what: str, where: str = "", remedy: str = "mend the file, or export it again") -> MechanismError:
     """What forbids to read a file, to be raised; `import_file` adds which file."""
     return MechanismError(Finding(what, where, remedy))
+
+
+@contextmanager
+def faults_of(path: Path) -> Iterator[None]:
+    """Report what goes wrong with a file of another program as a fault of that file."""
+    try:
+        yield
+    except MechanismError as error:
+        raise MechanismError([replace(finding, file=finding.file or str(path)) for finding in error.findings]) from None
+    except OSError as error:
+        raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
+    except (RecursionError, MemoryError):
+        raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
+    except Exception as error:  # a library raises anything at a damaged file
+        frame = [frame for frame, _ in walk_tb(error.__traceback__)][-1]
+        if isinstance(error, BUGS) and frame.f_globals.get("__name__", "").startswith("trunnion."):
+            raise  # our own mistake, not the file's
+        what = printable(f"is damaged, or not as its format has it: {type(error).__name__} {error}")
+        raise MechanismError(Finding(what, remedy="mend the file, or export it again", file=str(path))) from error
 
 
 def few(number: int, most: int, noun: str) -> None:

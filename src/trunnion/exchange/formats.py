@@ -7,16 +7,15 @@ findings of what it cannot hold, and an entry here.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, few, positions_of, printable, refused
+from trunnion.exchange.draft import MATERIALS, Draft, ImportOptions, faults_of, few, positions_of, refused
 from trunnion.exchange.model_file import complete
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 LINKS = "http:/", "https:/"  # how a path begins that is a link: its text is read, nothing is fetched
 FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read
-BUGS = (NameError, AttributeError, AssertionError)
 
 
 @dataclass(frozen=True)
@@ -146,7 +144,7 @@ def import_file(
             turns = None if isinstance(speed, (int, float)) else True
         except MechanismError:
             rate, turns = _number(speed, "speed", "speed"), False
-    try:
+    with faults_of(path):
         if str(path).startswith(LINKS):
             draft: Draft = _call("linkages.read_link", str(path))
         else:
@@ -157,18 +155,6 @@ def import_file(
                 raise refused("is empty")
             few(size, LARGEST, "bytes")
             draft = _call(entry.reads, path, options)
-    except MechanismError as error:
-        raise MechanismError([replace(finding, file=finding.file or str(path)) for finding in error.findings]) from None
-    except OSError as error:
-        raise MechanismError(Finding(f"cannot be read: {error.strerror or error}", file=str(path))) from None
-    except (RecursionError, MemoryError):
-        raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
-    except Exception as error:  # a library raises anything at a damaged file
-        frame = [frame for frame, _ in walk_tb(error.__traceback__)][-1]
-        if isinstance(error, BUGS) and frame.f_globals.get("__name__", "").startswith("trunnion."):
-            raise  # our own mistake, not the file's
-        what = printable(f"is damaged, or not as its format has it: {type(error).__name__} {error}")
-        raise MechanismError(Finding(what, remedy="mend the file, or export it again", file=str(path))) from error
     draft.source = draft.source or path.name
     draft.name = draft.name or path.stem
     return complete(draft.checked(), ground, drive, rate, turns)
@@ -231,10 +217,6 @@ def export_model(
         if not entry.parts:
             raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
         reading(original)
-        try:
-            Path(original).open("rb").close()
-        except OSError as error:
-            raise MechanismError(Finding(f"cannot be read: {error.strerror}", file=str(original))) from None
     with whole(path) as temporary:
         if original is None:
             findings: list[Finding] = _call(entry.writes, positions, temporary)

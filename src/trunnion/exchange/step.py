@@ -27,8 +27,8 @@ from trunnion.exchange.draft import (
     ImportOptions,
     Place,
     Positions,
+    faults_of,
     free_name,
-    printable,
     refused,
 )
 from trunnion.exchange.mating import joined
@@ -40,7 +40,6 @@ DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and an
 SIZE = 0.02  # of the mechanism: length of an axis of a skeleton that has no bearing
 FIT = 1e-6  # of the size: between the points of a model and of the file it is moved in
 Entry = tuple[Occurrence, Solid, Place]  # the part that a solid belongs to, and its place in the whole
-BROKEN = (IndexError, KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError, OverflowError)
 
 
 def read(path: Path, options: ImportOptions) -> Draft:
@@ -58,20 +57,11 @@ def read(path: Path, options: ImportOptions) -> Draft:
     ------
     MechanismError : if it is no STEP file, is cut off, too large or has no solids.
     """
-    return _opened(path, options)[0]
-
-
-def _opened(path: Path, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:
-    """The draft of a file, with the occurrence that each body comes from."""
-    try:
-        return _drafted(Part21(path), options)
-    except MechanismError:
-        raise
-    except BROKEN as error:
-        raise refused(printable(f"is not as ISO 10303-21 has it: {type(error).__name__} {error}")) from None
+    return _drafted(Part21(path), options)[0]
 
 
 def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dict[str, Occurrence]]:
+    """The draft of a file, with the occurrence that each body comes from."""
     assembly = Assembly(file, options.unit)
     links = assembly.tree()
     name = links[0].name if len(links) == 1 else ""
@@ -342,7 +332,8 @@ def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) ->
 
 def write_moved(positions: Positions, path: Path, original: Path) -> list[Finding]:
     """Write the file that a model was imported from, with the parts of its links where they are at a position."""
-    draft, assembly, parts = _opened(original, ImportOptions(ground=positions.mechanism.fixed_link))
+    with faults_of(original):
+        draft, assembly, parts = _drafted(Part21(original), ImportOptions(ground=positions.mechanism.fixed_link))
     file = assembly.file
     turn = _model_frame(positions, draft)
     changes: dict[int, str] = {}

@@ -1,5 +1,7 @@
 """Every example is read, checked and analysed, and its fact of the gallery holds."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from gallery.facts import ENTRIES, REFUSED
 from mechanisms_parts import EXAMPLES, example
 from trunnion import Status
 from trunnion.errors import MechanismError, Severity
+from trunnion.views.cycle import KINDS, figure
 
 
 def test_every_example_has_an_entry():
@@ -26,7 +29,7 @@ def test_every_example_has_a_name_and_notes(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENTRIES)
 def test_example(name):
-    """No error but those of the entry, no position without forces but those of the entry, and the fact."""
+    """No error but those of the entry, no position without forces but those of the entry, the fact, its pictures."""
     entry = ENTRIES[name]
     mechanism = example(name)
     errors = [str(one) for one in trunnion.check(mechanism, STEPS).findings if one.severity is Severity.ERROR]
@@ -35,6 +38,12 @@ def test_example(name):
     assert np.count_nonzero(result["status"] >= Status.NOT_CONVERGED) == entry.lost
     found, expected = entry.found(Outcome(mechanism, result)), entry.expected()
     assert found == pytest.approx(expected, rel=0, abs=entry.tolerance), entry.says
+    drawn = 0
+    for kind in KINDS:
+        with suppress(MechanismError):  # what it says: nothing of this kind to draw
+            drawn += figure(result, kind=kind) is not None
+    assert drawn
+    assert result.trunnion.report().rstrip().endswith("</html>")
 
 
 @pytest.mark.slow

@@ -113,7 +113,8 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
 def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Where the power goes: drive, useful, friction, and the remainder that masses and other loads take or give."""
-    drive, lost = (np.sum(list(members(result, name, dim).values()), axis=0)
+    x = abscissa(result).values
+    drive, lost = (np.sum([np.zeros(x.size), *members(result, name, dim).values()], axis=0)
                    for name, dim in (("drive_power", "driver"), ("friction_power", "joint")))  # fmt: skip
     useful = column(result, "useful_power")
     useful = np.zeros_like(lost) if useful is None else useful
@@ -122,7 +123,7 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     if peak(rest) > 1e-9 * peak(drive, useful, lost):
         label = "masses, springs and other loads" if "spring" in result.dims else "masses and other loads"
         parts.append((label, rest, Look("muted", 1.2, "short")))
-    lines = [Line(abscissa(result).values, values, name, look, close=True) for name, values, look in parts]
+    lines = [Line(x, values, name, look, close=True) for name, values, look in parts]
     return _stack("Power over the run", [over_drive(result, "power", "W", lines)])
 
 

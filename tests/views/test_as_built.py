@@ -119,3 +119,10 @@ if shutil.which("node"):  # as in test_scene.py
         counts = {factor: told["painted"] for factor, told in shown["at"].items()}
         assert counts["100"] > counts["1"] > 500
         assert shown["at"]["100"]["said"] == ["errors × 100, ideal as pale lines"]
+
+
+def test_links_that_have_no_place_as_built_are_not_moved():
+    mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-10mm.yaml").with_seats("loaded")
+    result = trunnion.analyse(mechanism, 6)
+    assert np.isnan(result.link_error.sel(link="cross")).all()  # locked by friction at every position
+    assert "cross" not in scene(result)["built"]["links"]

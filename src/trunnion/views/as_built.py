@@ -242,7 +242,7 @@ def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
     errors, tracks = (members(result, f"point_{what}", "point") for what in ("error", "position"))
     for link, pose in bodies.poses.items():
         of_link = {key: error for key, error in errors.items() if key.split(".", 1)[0] == link}
-        if link not in turns or not bodies.drawable.any() or not of_link:
+        if link not in turns or not np.isfinite(turns[link]).any() or not of_link:
             continue
         # places in the frame of the link, the means over the positions that are known
         places = {key: np.nanmean(np.einsum("jin,jn->in", pose.matrix, tracks[key] - pose.origin), axis=1)

@@ -233,7 +233,7 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints():
         (FOURBAR, "joint_defaults.pin.end_float", "1 mm", "a revolute joint in the plane has no play along"),
         (RSSR, "B.pin.end_float", "1 mm", "a spherical joint in space has no play along an axis"),
         (PLAYING, "B.seat.beta", "3 deg", "joints.B.seat.beta: a revolute joint in the plane does not tilt"),
-        (PLAYING, "B.seat.direction.x", 1, "has its seat stated by angles"),
+        (PLAYING, "", {"B.seat": {"direction": [1, 0]}}, "has its seat stated by angles"),
         (PLAYING, "joints.A.seat", "tight", "'tight' is not one of 'free' or 'loaded'"),
         (PLAYING, "joints.A.seat", [1, 2], "takes free, loaded or a group"),
         (SLIDER, "O.pin.hole_radius", "11 mm", "joints.O.pin.fit: is stated beside hole_radius"),

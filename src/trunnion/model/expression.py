@@ -66,8 +66,6 @@ FUNCTIONS: Final[Mapping[str, _Function]] = {
     "max": _Function("maximum", (2, _MANY), "same", "same"),
     "between": _Function("between", (3, 3), "same", "number"),
 }
-# what says the same, of functions that other languages have
-SIGN = "the sign of a speed v is max(-1, min(1, v / (1 mm/s))); what opposes a motion is resisting_force: or _torque:"
 RESERVED = frozenset({"pi", *FUNCTIONS})  # names a dimension cannot have
 MOTION = ("drive", "speed", "time")  # nor these: in loads, coordinate and rate of the first driver, and time
 PLACED = "."  # in a name: of a joint or a point, as in the columns of a result: S.slide, ram.Q.x, O.rotation_velocity
@@ -103,35 +101,23 @@ class Term:
 class Expression:
     """A parsed expression.
 
-    names: the dimensions it speaks of; evaluate: values of those (SI floats, arrays, duals) to a value;
-    literal: set if it is nothing but one number with its unit (and perhaps a minus); bare: whether it has neither a
-    unit nor a name in it; kinks: functions of the same values, where one of which changes its sign the value jumps or
-    bends: at both ends of a `between`, of an `abs` …
+    text: as it is read; names: the dimensions it speaks of; evaluate: values of those (SI floats, arrays, duals) to a
+    value; literal: set if it is nothing but one number with its unit (and perhaps a minus); bare: whether it has
+    neither a unit nor a name in it; kinks: functions of the same values, where one of which changes its sign the value
+    jumps or bends: at both ends of a `between`, of an `abs` …
     """
 
+    text: str
     names: tuple[str, ...]
     evaluate: Evaluator
     literal: Literal | None
     bare: bool
     kinks: tuple[Evaluator, ...]
-    _tree: ast.expr = field(repr=False)
-    _operands: Mapping[str, Literal | str] = field(repr=False)
     term: Term = field(repr=False)
 
-    @classmethod
-    def of(cls, tree: ast.expr, operands: Mapping[str, Literal | str]) -> Expression:
-        """The expression of a tree whose names stand for operands."""
-        part = _compile(tree, operands)
-        names = dict.fromkeys(item for item in operands.values() if isinstance(item, str) and item not in RESERVED)
-        literals = [operand for operand in operands.values() if isinstance(operand, Literal)]
-        core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
-        alone = literals[0] if isinstance(core, ast.Name) and literals else None
-        bare = len(literals) == len(operands) and not any(operand.unit for operand in literals)
-        return cls(tuple(names), part.value, alone, bare, tuple(_kinks(part)), tree, operands, part)
-
-    def __reduce__(self) -> tuple[Callable[..., Expression], tuple[ast.expr, Mapping[str, Literal | str]]]:
+    def __reduce__(self) -> tuple[Callable[[str], Expression], tuple[str]]:
         """Compiled anew in another process: closures cannot be pickled."""
-        return Expression.of, (self._tree, self._operands)
+        return parse, (self.text,)
 
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
@@ -168,7 +154,13 @@ def parse(text: str) -> Expression:
         raise UnitError(f"'{text}' cannot be read", "check operators and parentheses") from None
     if depth > MAX_DEPTH:
         raise UnitError(f"'{text[:40]}…' is nested too deeply", "split it in dimensions")
-    return Expression.of(tree, operands)
+    term = _compile(tree, operands)
+    names = dict.fromkeys(item for item in operands.values() if isinstance(item, str) and item not in RESERVED)
+    literals = [operand for operand in operands.values() if isinstance(operand, Literal)]
+    core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
+    alone = literals[0] if isinstance(core, ast.Name) and literals else None
+    bare = len(literals) == len(operands) and not any(operand.unit for operand in literals)
+    return Expression(text, tuple(names), term.value, alone, bare, tuple(_kinks(term)), term)
 
 
 def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
@@ -246,8 +238,7 @@ def _operand(operand: Literal | str) -> Term:
     if operand == "pi":
         return Term(lambda names: np.float64(np.pi), lambda names: NUMBER, (operand,))
     if operand in FUNCTIONS:
-        speed = "; an angular speed is in rpm or rad/s" if operand == "min" else ""
-        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…){speed}")
+        raise UnitError(f"the function '{operand}' has no argument", f"write {operand}(…)")
     name = operand
 
     def look_up(names: Mapping[str, Number]) -> Number:
@@ -306,8 +297,7 @@ def _call(name: Literal | str, arguments: tuple[Term, ...]) -> Term:
     if isinstance(name, Literal):
         raise UnitError("an operator is missing before a parenthesis", "write a product as 2 * (a + b)")
     if name not in FUNCTIONS:
-        others = "the functions are " + ", ".join(sorted(FUNCTIONS))
-        raise UnitError(f"'{name}' is not a function", SIGN if name in ("sign", "sgn", "signum", "tanh") else others)
+        raise UnitError(f"'{name}' is not a function", "the functions are " + ", ".join(sorted(FUNCTIONS)))
     function = FUNCTIONS[name]
     least, most = function.arguments
     if not least <= len(arguments) <= most:

@@ -23,7 +23,7 @@ from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.joint_parts import Seat, has_play, play
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, item_name, measured
+from trunnion.model.parameters import Location, measured
 from trunnion.model.places import assign, fields_at, schema_findings, stated_at, with_law
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import Cost, Variation
@@ -326,35 +326,27 @@ def _of_number(mechanism: Varying, section: str, rest: str) -> tuple[str, Locati
 
 def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
     """Paths and places of keys that entries of the file may state by a name: `B.pin.clearance`, `A.motor.limit` …"""
-    keys = tuple(name.split("."))
+    keys, data = tuple(name.split(".")), mechanism.data()
     sections = {key: getattr(mechanism, key) for key in type(mechanism).model_fields}
     sections["joints"] = mechanism.stated_joints
-    named = [(section, *keys) for section, entries in sections.items()
-             if isinstance(entries, Mapping) and isinstance(entries.get(keys[0]), BaseModel)]  # fmt: skip
-    owner = sections.get(keys[0])
-    if isinstance(owner, Mapping) and keys[1:]:
-        owner = owner.get(keys[1])
-    if isinstance(owner, str | BaseModel):
-        named.insert(0, keys)
-    rows, data = [row.joint for row in mechanism.loop], mechanism.data()
-    for location in named:
-        above, key = location[:-1], location[-1]
-        looped = location[0] == "joints" and location[1] in rows
-        place: Location = ("loop", rows.index(location[1]), *location[2:]) if looped else location
-        fields, group = fields_at(type(mechanism), above), stated_at(data, place[:-1])
-        if key not in fields and key in ("x", "y", "z"):  # of a direction, which is made if need be
-            annotation = fields_at(type(mechanism), above[:-1]).get(above[-1])
-            of_axes = item_name(place[:-1], "xyz".index(key)) == key and _is_number(annotation, in_rows=True)
-            if of_axes and isinstance(group, list | None):
-                yield ".".join(location), (*place[:-1], "xyz".index(key))
-        elif key in fields and (group is None or isinstance(group, dict) or above[-1:] in (("friction",), ("seat",))):
+    rows = [row.joint for row in mechanism.loop]
+    for location in (keys, *((section, *keys) for section in sections)):
+        section, owner = location[0], location[1] if location[1:] else ""
+        entries = sections.get(section)
+        if not isinstance(entries.get(owner) if isinstance(entries, Mapping) else entries, str | BaseModel):
+            continue
+        place: Location = location
+        if section == "joints" and owner in rows:
+            place = ("loop", rows.index(owner), *location[2:])
+        *_, above, key = ("", *location)
+        fields, group = fields_at(type(mechanism), location[:-1]), stated_at(data, place[:-1])
+        if key in fields and (group is None or isinstance(group, dict) or above in ("friction", "seat")):
             if key == "friction":  # a plain number is the coefficient
                 location, place = (*location, "coefficient"), (*place, "coefficient")
             yield ".".join(location) if key == "friction" or _is_number(fields[key]) else "", place
 
 
-def _is_number(annotation: Any, in_rows: bool = False) -> bool:
-    """Whether a field is a quantity, or a row of them, or may be one of several forms that is."""
-    if annotation is Quantity or get_origin(annotation) is tuple:
-        return (annotation is Quantity) != in_rows
-    return any(_is_number(form, in_rows) for form in get_args(annotation))
+def _is_number(annotation: Any) -> bool:
+    """Whether a field is a quantity, or may be one of several forms that is."""
+    several = () if get_origin(annotation) is tuple else get_args(annotation)
+    return annotation is Quantity or any(map(_is_number, several))

@@ -98,7 +98,6 @@ BAD = [
     ("0;1.234,5\n1;0\n", ["points.csv:1: error: '1.234,5' is not a finite number"]),
     ("t;q\n0;0\n2;1\n1;2\n", ["points.csv:4: error: drivers.O.points.2: its time 1 does not come after 2"]),
     ("1;0\n2;1\n", ["points.csv:1: error: drivers.O.points.0: the table begins at 1 s"]),
-    ("0;1\n2;1\n", ["points.csv:1: error: drivers.O.points: the table never moves"]),
     ("t [mm];q [N]\n0;1\n2;1\n", ["points.csv:1: error: t [mm]: its unit is that of a length, the column is of time",
                                  "points.csv:1: error: q [N]: its unit is that of a force, the column is of angle"]),
     ("t [mss];q\n0;1\n2;1\n", ["points.csv:1: error: t [mss]: the unit 'mss' is not known"]),

@@ -127,11 +127,6 @@ class Part(BaseModel):
 
     __delattr__ = _refuse
 
-    def __dir__(self) -> list[str]:
-        """Its own names; those of pydantic work, and show the way to nothing."""
-        foreign = {name for name in dir(BaseModel) if not name.startswith("_")} - type(self).model_fields.keys()
-        return [name for name in super().__dir__() if name not in foreign]
-
     def filled(self, values: Mapping[str, Any]) -> Self:
         """With values for keys that it does not state."""
         return self.model_copy(update={key: value for key, value in values.items() if getattr(self, key) is None})

@@ -354,8 +354,7 @@ _PHRASES: Final = {  # whole units, without their spaces
 }
 _TORQUE = re.compile(r"(?<![\w])((?:[mkMcµμu]|da)?)N(mm|cm|m)(?!\w)([\^*]?)")
 _TURNS = re.compile(r"(?<![\w])(?:U|Umdr\.?)\s?/\s?(?=(?:min|s)(?!\w))")
-_POUND_FEET = re.compile(r"(?<!\w)(?:(ft|in)-(lb|oz)[fs]?|(lb|oz)[fs]?-(ft|in))(?!\w)")
-_POUND_FEET_ALONE = re.compile(r"(?:(ft|in)[ .·⋅*]?(lb|oz)[fs]?|(lb|oz)[fs]?[ .·⋅*]?(ft|in))")
+_POUND_FEET = re.compile(r"(?<!\w)(?:(ft|in)[- .·⋅*]?(lb|oz)[fs]?|(lb|oz)[fs]?[- .·⋅*]?(ft|in))(?!\w)")
 _SECOND = re.compile(r"(?<![\w])[Ss]ek\b\.?|(?<![\w])[Ss]ec\.")
 
 
@@ -378,12 +377,7 @@ def pound_feet(text: str) -> str:
 
     Not of a model's: a minus may stand there, and `lb ft` is a mass times a length. No sensor measures that.
     """
-
-    def product(match: re.Match[str]) -> str:
-        return f"({match[2] or match[3]}f {match[1] or match[4]})"
-
-    alone = _POUND_FEET_ALONE.fullmatch(text.strip())
-    return product(alone) if alone else _POUND_FEET.sub(product, text)
+    return _POUND_FEET.sub(lambda match: f"({match[2] or match[3]}f {match[1] or match[4]})", text)
 
 
 def _remedy(text: str, word: str) -> str:

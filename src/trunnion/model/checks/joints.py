@@ -102,8 +102,6 @@ def _vain(mechanism: Numbers) -> Iterator[Finding]:
             own, default = _value(mechanism.stated_joints[name], key), _value(mechanism.joint_defaults, key)
             if part in lost or _value(joint, key) in (None, "free") or (own is None and default is None):
                 continue
-            if key == "friction" and _is_off(joint):
-                continue
             where = f"joint_defaults.{key}" if own is None and part != "friction" else f"joints.{name}.{key}"
             if applies:
                 used.add(where)
@@ -162,12 +160,6 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _is_off(joint: Joint) -> bool:
-    """Whether no friction is meant by a word: see `parts.unknown_name`."""
-    coefficient = joint.friction and joint.friction.parameters.get("coefficient")
-    return bool(coefficient and not {"off", "none"}.isdisjoint(coefficient.names))
-
-
 def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
     """The point of a joint on each of its links, with an axis where the pair has one."""
     key, position = as_key(name), mechanism.position_form
@@ -185,7 +177,7 @@ def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
 def _lacks(joint: Joint, pair: Pair, spatial: bool, where: str) -> Iterator[Finding]:
     """What a joint lacks that something else of it needs."""
     pin, guide, contact = joint.pin, joint.guide, joint.contact
-    rubs = joint.friction is not None and (pair.turns or pair.guided) and not _is_off(joint)
+    rubs = joint.friction is not None and (pair.turns or pair.guided)
     lacks = contact_lacks(joint, spatial) if rubs else ()
     no_radius, part = pair.turns and pin is not None and pin.radius is None, "guide" if pair.guided else "pin"
     seated, has = joint.seat != "free" and joint.type in PLAY_PAIRS, has_play(joint)

@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, Severity, counted
+from trunnion.errors import Finding, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import MOTION, PLACED, RESERVED
 from trunnion.model.fields import drive_kind
@@ -65,7 +65,6 @@ def driver_values(mechanism: Numbers, name: str, values: Values) -> Iterator[Fin
         yield from faults(
             where,
             (begin != 0, "points.0", f"the table begins at {begin:g} s", "begin it at 0 s and shift it by delay: …"),
-            (len({*places}) == 1, "points", "the table never moves"),
             (open_end and not abs(turns - np.round(turns)) <= 1e-9, "points",
              f"a periodic table that begins at {places[0]:g} and ends at {places[-1]:g} (SI)",
              "end it where it begins, or whole turns from there, or state periodic: false"),
@@ -140,7 +139,6 @@ def loop(mechanism: Numbers) -> Iterator[Finding]:
         "",
         (rows and mechanism.space == "planar", "loop", "a loop is spatial", "state space: spatial"),
         (rows and mechanism.joints, "joints", "joints and loop are both given"),
-        (len(rows) == 1, "loop", "one joint makes no loop", "add the joints and links up to the ground again"),
         *((True, "loop", f"the joint or link '{name}' occurs in several rows") for name in again),
         (rows and fixed in mechanism.links and fixed not in links, "ground" if mechanism.ground else "loop",
          f"the fixed link '{fixed}' is not a link of the loop: {', '.join(links)}"),
@@ -201,8 +199,6 @@ def _measure(value: Quantity, names: Dimensions) -> Dimension | None:
 
 def unknown_name(mechanism: Numbers, name: str, path: str, source: object, names: Dimensions) -> Finding:
     """A name in an expression that means nothing there."""
-    if name in ("off", "none"):
-        return Finding(f"'{source}' is no number", path, "write 0")
     refers = "" if str(source).strip() == name else f"refers to '{name}', which "
     moves = motion_dimensions(mechanism, names) if path.startswith("loads.") else {}
     remedy = nearest(name, [*names, *moves])
@@ -243,8 +239,6 @@ def tables(mechanism: Numbers, names: Dimensions) -> Iterator[Finding]:
              f"state points: {example}, or file: {as_key(f'{name}.csv')}, or give a file by --table"),
             (count and table.repeats and count < (3 if table.period is None else 2), "points",
              "a periodic table needs three points"),
-            (table.period is not None and "periodic" in table.model_fields_set and not table.periodic, "period",
-             "has no effect on a table without a period", "remove it, or write periodic: true"),
         )  # fmt: skip
         measures = [_measure(value, names) for _, value in table.points]
         first = next((measured for measured in measures if measured), None)
@@ -343,8 +337,6 @@ def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
             (spring.joint not in mechanism.drivers and turns > 1, "free_angle",
              f"is {turns:.3g} turns, but the rotation of '{spring.joint}', which is not driven, counts none",
              "state the angle within a turn and the winding as preload: …"),
-            (values.get(f"{where}.stiffness") == 0 and preload == 0, "stiffness", "is 0: the spring does not pull",
-             "remove it", Severity.WARNING),
         )  # fmt: skip
 
 
@@ -368,6 +360,4 @@ def load_findings(mechanism: Numbers) -> Iterator[Finding]:
                f"a {joint and joint.type} joint has no "
                f"{f'{freedom} to resist' if freed else 'one axis that it could act about or along'}",
                f"resist a {ONE_AXIS}, or state a force or moment on a link") for key, freedom in resists.items()),
-            (load.link == (mechanism.fixed_link or None), "", "acts on the fixed link and has no effect", "",
-             Severity.WARNING),
         )  # fmt: skip

@@ -8,7 +8,6 @@ is computed. What a run writes beyond what it said, such as the figures of a fol
 from __future__ import annotations
 
 import os
-import re
 import secrets
 import shutil
 import stat
@@ -24,10 +23,6 @@ from pathlib import Path
 from trunnion.errors import Finding, MechanismError
 
 REMEDY = "name another file"
-MOST_LINKS = 40  # one to the other, as operating systems have it
-_DESCRIPTOR = re.compile(r"/dev/(?:(stdin)|(stdout)|(stderr)|fd/(\d+))|/proc/(?:self|\d+)/fd/(\d+)")
-
-
 UMASK = os.umask(0)  # read once: reading it means setting it, for the whole process
 os.umask(UMASK)
 
@@ -126,7 +121,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     destination = Path(path)
     guard(destination)
     with _unwritable(destination):
-        target, stream = _destination(destination)
+        target = _destination(destination)
     folder = target.parent if target else Path(tempfile.gettempdir())
     draft = f".{destination.stem[:40]}-{secrets.token_hex(4)}{destination.suffix}"
     temporary = folder / draft  # known before it is there
@@ -136,7 +131,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         with _unwritable(destination):
             yield temporary
             if target is None:
-                _poured(temporary, stream, destination)
+                _poured(temporary, destination)
                 return
             temporary.chmod(_mode(temporary, target))
             temporary.replace(target)
@@ -164,33 +159,28 @@ def _unwritable(path: Path, remedy: str = "") -> Iterator[None]:
         raise MechanismError(Finding(f"cannot be written: {error.strerror or error}", str(path), remedy)) from None
 
 
-def _destination(path: Path) -> tuple[Path | None, int | None]:
-    """The file to be replaced, behind all links; or None for what is written to, with its descriptor if it is one."""
-    step = path
-    for _ in range(MOST_LINKS):
-        if match := _DESCRIPTOR.fullmatch(os.path.normpath(os.path.abspath(step))):
-            number = next((k for k in range(3) if match[k + 1]), None)
-            return None, int(match[4] or match[5]) if number is None else number
-        if not step.is_symlink():
-            break
-        step = step.parent / os.readlink(step)
-    if step.is_dir():
+def _destination(path: Path) -> Path | None:
+    """The file to be replaced, behind all links; None for what is written to: a device, a pipe, where output goes."""
+    if path.is_dir():
         raise MechanismError(Finding("cannot be written: it is a folder", str(path), "name a file"))
+    target = Path(os.path.realpath(path))
     try:
-        kind = step.stat().st_mode
+        there = path.stat()
     except FileNotFoundError:
-        return step, None
-    return (step if stat.S_ISREG(kind) else None), None
+        return target
+    with suppress(OSError):  # of a program without an output
+        if os.path.samestat(there, os.fstat(1)):
+            return None
+    return target if stat.S_ISREG(there.st_mode) else None
 
 
-def _poured(temporary: Path, descriptor: int | None, path: Path) -> None:
-    """Write what was made into a device, a pipe, or what the process has open under a number."""
+def _poured(temporary: Path, path: Path) -> None:
+    """Write what was made into a device or a pipe, or behind what the output of the program has."""
     if temporary.is_dir():
         what = "cannot be written: a folder of files does not go through a pipe"
         raise MechanismError(Finding(what, str(path), "name a file"))
     sys.stdout.flush()
-    target = os.dup(descriptor) if descriptor is not None else os.open(path, os.O_WRONLY)
-    with open(target, "wb") as stream, temporary.open("rb") as made:
+    with open(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as stream, temporary.open("rb") as made:
         shutil.copyfileobj(made, stream)
 
 

@@ -45,8 +45,7 @@ MISTAKES = {
             ("B: [AB]", "links.crank.points.B", "has 1 entries, at least 2"),
             ("B: [AB, 0, 0]", "links.crank.points.B", "has 3 coordinates"),
             ("'=B': [AB, 0]", "links.crank.points.=B", "begins with '=', which makes a formula"),
-            ("Bx: [AB, 0]", "joints.B", "the link 'crank' has no point 'B'", 9),
-            ("B: [0, 0]", "links.crank.points", "'A' and 'B' of the link 'crank' are at one")],
+            ("Bx: [AB, 0]", "joints.B", "the link 'crank' has no point 'B'", 9)],
         "space: planar": [("ground: base", "ground", "there is no link 'base'")],
         "trunnion: 1": [
             ("trunnion: 2", "trunnion", "version 2, this program reads 1"),

@@ -97,9 +97,8 @@ def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
         raise MechanismError(Finding(f"'{at}' is not a position: {error.what}", "at", remedy)) from None
     except KeyError:
         raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
-    meant = in_radians("at", value)
-    if kind.unit == "rad" and not isinstance(at, str) and meant.severity is Severity.WARNING:
-        raise MechanismError(replace(meant, severity=Severity.ERROR))
+    if kind.unit == "rad" and not isinstance(at, str) and (doubts := [*in_radians("at", value)]):
+        raise MechanismError(replace(doubts[0], severity=Severity.ERROR))
     return value, kind.unit == "s"
 
 

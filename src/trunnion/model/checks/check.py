@@ -210,6 +210,7 @@ def check_values(
             yield from group_findings(f"{section}.{name}", entries[name], values)
             if section == "links":
                 yield from _mass(mechanism, mechanism.links[name], values, f"links.{name}")
+                yield from _along(mechanism.links[name], values, f"links.{name}")
             elif section == "joints":
                 yield from joints.joint_values(mechanism, name, numbers)
             elif section == "drivers":
@@ -222,8 +223,6 @@ def check_values(
     if not sections.isdisjoint(("tables", "drivers")):
         yield from parts.table_values(mechanism, values)
     yield from parts.spring_values(mechanism, values)
-    if "links" in sections:
-        yield from _sides(mechanism, values)
     if "measures" in sections:
         yield from tolerances.measure_values(mechanism, numbers)
 
@@ -242,30 +241,17 @@ def _alone(numbers: ParameterSet, path: str) -> Iterator[Finding]:
         yield from limit_findings(entry.rules, values[path], entry.kind, path)
 
 
-def _sides(mechanism: Varying, values: Values) -> Iterator[Finding]:
-    """A link of two turning joints at one point has no length; a direction x along the axis counts no rotation."""
-    spatial = mechanism.space == "spatial"
-    geared = {joint for gear in mechanism.gears.values() for joint in gear.joints}  # a shaft with two passes on torque
-    for name, link in mechanism.links.items():
-        for point, place in link.points.items() if spatial else ():
-            path = f"links.{name}.points.{point}"
-            if place.x is not None:
-                x = [float(values[f"{path}.x.{letter}"]) for letter in "xyz"]
-                axis = [float(values[f"{path}.axis.{letter}"]) for letter in "xyz"] if place.axis else [0.0, 0.0, 1.0]
-                across, size = np.linalg.norm(np.cross(axis, x)), np.linalg.norm(axis) * np.linalg.norm(x)
-                if size > 0 and across <= ALONG * size:
-                    what = "lies along the axis" + " [0, 0, 1]" * (place.axis is None)
-                    yield Finding(what, f"{path}.x", "give a direction across the axis, or none")
-        ends = {key: joint for key, joint in mechanism.effective_joints.items()
-                if name in joint.links and key in link.points}  # fmt: skip
-        turn = all(joint.pair.turns for joint in ends.values())
-        if spatial or len(ends) != 2 or not turn or not geared.isdisjoint(ends):
-            continue
-        first, second = ([values[f"links.{name}.points.{key}.{axis}"] for axis in "xy"] for key in ends)
-        if first == second:
-            severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
-            what = f"the joints {' and '.join(map(repr, ends))} of the link '{name}' are at one point"
-            yield Finding(what, f"links.{name}.points", "move one of them", severity)
+def _along(link: Link, values: Values, where: str) -> Iterator[Finding]:
+    """A direction x along the axis of its point counts no rotation."""
+    for point, place in link.points.items():
+        if place.x is not None and len(place.x) == 3:
+            path = f"{where}.points.{point}"
+            x = [float(values[f"{path}.x.{letter}"]) for letter in "xyz"]
+            axis = [float(values[f"{path}.axis.{letter}"]) for letter in "xyz"] if place.axis else [0.0, 0.0, 1.0]
+            across, size = np.linalg.norm(np.cross(axis, x)), np.linalg.norm(axis) * np.linalg.norm(x)
+            if size > 0 and across <= ALONG * size:
+                what = "lies along the axis" + " [0, 0, 1]" * (place.axis is None)
+                yield Finding(what, f"{path}.x", "give a direction across the axis, or none")
 
 
 def _mass(mechanism: Varying, link: Link, values: Values, where: str) -> Iterator[Finding]:
@@ -393,19 +379,14 @@ def plain_angles(mechanism: Varying, entries: Iterable[tuple[Entry, Sayable]]) -
     stated = (entry.quantity for entry in mechanism.entries if entry.quantity is not USUAL_PRESSURE_ANGLE)
     with_units = any(quantity.unit for quantity in stated)
     for where, value, verb in largest.values():
-        finding = in_radians(where, value, verb)
-        if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):
-            yield finding
+        if with_units or abs(value) > 2 * math.pi:
+            yield from in_radians(where, value, verb)
 
 
-def in_radians(where: str, value: float, verb: str = "is") -> Finding:
-    """What a plain number of an angle means.
-
-    A whole number, or many turns, is a warning: it is likely meant in degrees; but a driver may well go through turns.
-    """
-    turned, integral = abs(value) > 2 * math.pi, value.is_integer() and value != 0
-    doubtful = integral or (turned and not where.startswith("drivers."))
-    size = f"{value / (2 * math.pi):.3g} turns" if turned else f"{math.degrees(value):.3g}°"
-    what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
-    remedy = f"write {value:g} deg if it is in degrees, else {value:g} rad"
-    return Finding(what, where, remedy, Severity.WARNING if doubtful else Severity.NOTE)
+def in_radians(where: str, value: float, verb: str = "is") -> Iterator[Finding]:
+    """A warning of a plain number that is likely meant in degrees: a whole one, or of many turns, but of a driver."""
+    turned = abs(value) > 2 * math.pi
+    if (value.is_integer() and value != 0) or (turned and not where.startswith("drivers.")):
+        size = f"{value / (2 * math.pi):.3g} turns" if turned else f"{math.degrees(value):.3g}°"
+        what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
+        yield Finding(what, where, f"write {value:g} deg if it is in degrees, else {value:g} rad", Severity.WARNING)

@@ -37,11 +37,11 @@ def test_every_code_is_written_out():
 @pytest.mark.parametrize("severity", Severity)
 def test_a_finding_has_code_place_and_figures(severity):
     make = {Severity.NOTE: Finding.note, Severity.WARNING: Finding.warning, Severity.ERROR: Finding.error}[severity]
-    finding = make("load.not_counted", "loads.F", "this load supplies 2 J", "leave it out", work=2.0)
-    assert (finding.code, finding.where, finding.severity) == ("load.not_counted", "loads.F", severity)
+    finding = make("contact.lost", "loads.F", "this load supplies 2 J", "leave it out", work=2.0)
+    assert (finding.code, finding.where, finding.severity) == ("contact.lost", "loads.F", severity)
     assert str(finding) == f"{severity}: loads.F: this load supplies 2 J — leave it out"
     assert finding.figures == {"work": 2.0}
-    assert finding == Finding.weighed(severity, "load.not_counted", "loads.F", finding.what, finding.remedy, work=2.0)
+    assert finding == Finding.weighed(severity, "contact.lost", "loads.F", finding.what, finding.remedy, work=2.0)
 
 
 def test_figures_can_be_written_as_json():

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal, single
-from trunnion.cycle.course import CycleCourse, Means, course_of
+from trunnion.cycle.course import CycleCourse, course_of
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
@@ -25,9 +25,9 @@ from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import between, readable
 from trunnion.solve import loads
-from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
+from trunnion.solve.loads import Stated, stated_walk
 from trunnion.solve.margin import margin_in
-from trunnion.solve.seating import NO_LOAD, UNSETTLED, EndLoads, seating_of
+from trunnion.solve.seating import NO_LOAD, UNSETTLED, Crossing, seating_of
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.system import System, felt, rubbing
 
@@ -38,12 +38,10 @@ Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 CLASS_TWO = 2
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
-LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 RESOLVED = 1e-7  # of its largest value: a resistance that is below 0 by less is 0, for so well its course is known
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
 MOST_PLACES = 8  # named in one sentence
 WITHIN = 17  # times at which a range that locks between the positions is looked at, with its ends
-APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")  # by the place of an end
 
 
@@ -128,16 +126,11 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         remedy = f"state gravity: {down}, or gravity: {none}"
         notes.append(Finding.note("model.gravity", "gravity", what, remedy, links=heavy))
     if playing:
-        # no seats are taken where links are over-constrained
-        redundant_joints = {name for module in system.plan.modules if module.redundant for name in module.joints}
-        seatable = [name for name in playing if name not in redundant_joints]
-        of = f" of {', '.join(seatable)}" if len(seatable) < len(playing) else ", or analyse with --seat loaded"
-        remedy = f"for pins pressed to one side by their loads state seat: loaded{of}"
-        if not seatable:
-            remedy = "see `trunnion play` for the effect of the play, `trunnion assemble` for whether the links fit "
-            remedy += "together"
+        remedy = "for pins pressed to one side by their loads state seat: loaded, or analyse with --seat loaded"
+        if any(module.redundant for module in system.plan.modules):  # no seats are taken in over-constrained links
+            remedy = "see `trunnion play` for the effect of the play, and `trunnion assemble` for whether links fit"
         what = f"the pins of {', '.join(playing)} are at the middle of their play"
-        notes.append(Finding.note("model.play_centred", "joints", what, remedy, joints=playing, seatable=seatable))
+        notes.append(Finding.note("model.play_centred", "joints", what, remedy, joints=playing))
     return notes
 
 
@@ -244,18 +237,15 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
         what += f"{share:.4g} times the friction of {', '.join(joints)}"
         remedy = f"lower the coefficients of all joints below {min(share, margin):.3g} times their values, shorten the "
         remedy += "arms or lengthen the guides"
-        decides, multiple = "", 1.0
+        figures: dict[str, Any] = {"at": where, "share": share, "joints": joints, "whole": margin}
+        figures |= {"decides": "", "multiple": None}
         if cycle.locking is not None:
-            if LockingState.JAMMED in (states := cycle.locking.all_states()):
-                also = "at some of these positions" if LockingState.LOCKED in states else "there"
-                what += f"; driven backward it locks {also} too (jammed)"
-            decides, multiple = cycle.locking.responsible or (decides, multiple)
-        if decides not in module.joints or multiple >= 1:
-            decides = ""
-        if decides:
-            remedy = f"lower the coefficient of {decides} alone below {multiple:.3g} times its value; or {remedy}"
-        figures = {"at": where, "share": share, "joints": joints, "whole": margin, "decides": decides}
-        figures["multiple"] = multiple if decides else None
+            if LockingState.JAMMED in cycle.locking.all_states():
+                what += "; driven backward it locks too (jammed)"
+            decides, multiple = cycle.locking.responsible or ("", 1.0)
+            if decides in module.joints and multiple < 1:
+                remedy = f"lower the coefficient of {decides} alone below {multiple:.3g} times its value; or {remedy}"
+                figures |= {"decides": decides, "multiple": multiple}
         yield Finding.error("friction.locked", f"links {', '.join(module.links)}", what, remedy, **figures)
 
 
@@ -371,29 +361,19 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
 
 
 def _springs(cycle: Cycle) -> Iterator[Finding]:
-    """Springs whose torque jumps, or that never act."""
+    """Springs whose torque jumps."""
     run, springs = cycle.run, cycle.mechanism.springs
-    if not springs:
+    turning = [row for row, item in enumerate(springs.values()) if item.joint and run.system.turns(item.joint)]
+    if not turning:
         return
     courses = cycle.course_of(lambda time: [state.elongation for *_, state in loads.springs(run.walk(time))])
-    for row, (name, spring) in enumerate(springs.items()):
-        where, elongation = f"springs.{name}", courses.picked(np.array([row]))
-        free = float(np.max(run.values.get(f"{where}.free_length", 0.0)))
-        least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
-        if least is None or most is None:
-            continue
-        if spring.joint is not None and run.system.turns(spring.joint):
-            before, after = elongation.sides(0)
-            if len(jumps := np.flatnonzero(np.abs(after - before) > np.pi)):
-                at = cycle.place(float(courses.edges[1 + jumps[0]]))
-                what = f"its torque jumps at {at}, where its angle passes half a turn from the free angle"
-                remedy = "whole turns are not counted in this joint"
-                yield Finding.warning("spring.jump", where, what, remedy, at=at)
-        if (spring.only == "pull" and most.value < 0) or (spring.only == "push" and least.value > 0):
-            nearest = free + (most if spring.only == "pull" else least).value
-            what = f"never acts: it can only {spring.only}, its free length is {readable(free, 'm')}, and the length "
-            what += f"nearest to that is {readable(nearest, 'm')}"
-            yield Finding.warning("spring.never_acts", where, what, free=free, nearest=nearest)
+    for row in turning:
+        before, after = courses.sides(row)
+        if len(jumps := np.flatnonzero(np.abs(after - before) > np.pi)):
+            at = cycle.place(float(courses.edges[1 + jumps[0]]))
+            what = f"its torque jumps at {at}, where its angle passes half a turn from the free angle"
+            remedy = "whole turns are not counted in this joint"
+            yield Finding.warning("spring.jump", f"springs.{list(springs)[row]}", what, remedy, at=at)
 
 
 def _slack(cycle: Cycle) -> Iterator[Finding]:
@@ -415,56 +395,16 @@ def _slack(cycle: Cycle) -> Iterator[Finding]:
             yield Finding.note("gears.slack", f"gears.{name}", what, remedy, lower=low, upper=high)
 
 
-def beside_the_drive(mechanism: Mechanism) -> list[str]:
-    """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
-    useful = useful_loads(mechanism)
-    driven = {link for name in mechanism.drivers for link in mechanism.effective_joints[name].links}
-    driven.discard(mechanism.fixed_link)
-    return [name for name, load in mechanism.loads.items() if load.link in driven and name not in useful]
-
-
 def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
-    """A warning of an efficiency above 1, with the work of each source beside the drives; else notes of loads that act
-    beside the drive and supply work."""
-    run, means = cycle.run, cycle.at.means
-    on_drive = beside_the_drive(cycle.mechanism)
-    above = means.efficiency > 1 + ROUNDED + means.efficiency_error
-    if not (above or on_drive) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
-        return
-    drive = means.drive_power.net * run.cycle.duration
-    every = _work(cycle, means)
-    work = {name: value for name, value in every.items() if value > LEAST * abs(drive)}
-    if above:
-        work = work or dict([max(every.items(), key=lambda item: item[1])])
-        supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
+    """An efficiency above 1: something beside the drives supplies work, which is not counted as input."""
+    means = cycle.at.means
+    if means.efficiency > 1 + ROUNDED + means.efficiency_error:
+        drive = means.drive_power.net * cycle.run.cycle.duration
         what = f"the efficiency of the cycle is {means.efficiency:.4g}, above 1: the drive supplies "
-        what += f"{readable(drive, 'J')}, beside it {supplies}"
+        what += f"{readable(drive, 'J')}, and loads that are not useful, springs or masses supply work beside it"
         remedy = "work beside the drive is not counted as input; leave out a load that stands for the drive itself"
-        figures = {"efficiency": means.efficiency, "drive": drive, "work": work}
+        figures = {"efficiency": means.efficiency, "drive": drive}
         yield Finding.warning("efficiency.above_one", "", what, remedy, **figures)
-        return
-    for name in on_drive:
-        if (supplied := work.get(f"load {name}")) is not None:
-            what = f"beside the drive, which supplies {readable(drive, 'J')}, this load supplies "
-            what += f"{readable(supplied, 'J')} over the cycle; the efficiency does not count it as input"
-            remedy = "leave out a load that stands for the drive itself, such as the force of a hand"
-            yield Finding.note("load.not_counted", f"loads.{name}", what, remedy, work=supplied, drive=drive)
-
-
-def _work(cycle: Cycle, means: Means) -> dict[str, float]:
-    """Work over the cycle, J, into the mechanism by each load and spring that is not useful, and by its masses."""
-    run, mechanism, duration = cycle.run, cycle.mechanism, cycle.run.cycle.duration
-    others = [name for name in mechanism.loads if name not in useful_loads(mechanism)]
-    springs = [name for name in mechanism.springs if name not in useful_springs(mechanism)]
-
-    def powers(time: Array) -> list[Array]:
-        back = run.solve(time)
-        return [*(back.load_powers[name] for name in others), *(back.springs[name].power for name in springs)]
-
-    names = [*(f"load {name}" for name in others), *(f"spring {name}" for name in springs)]
-    work = (cycle.course_of(powers).mean() * duration).tolist() if names else []
-    rest = means.useful_power.net + means.friction_power.net - means.drive_power.net
-    return {**dict(zip(names, work, strict=True)), "weight and inertia": rest * duration - sum(work)}
 
 
 # ---- pins and errors ------------------------------------------------------------------------------------------
@@ -476,79 +416,58 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
     if not run.seats:
         return
     seating = seating_of(run, at.method)
-    loads = seating.loads
-    yield from _unloaded(cycle, loads)
-    lost: dict[tuple[str, str], list[str]] = {}
-    lifted: dict[tuple[str, str], list[str]] = {}
+    loads, unsettled = seating.loads, seating.states(at.time) == UNSETTLED
+    idle: dict[str, dict[str, None]] = {}
+    for end, low, high in loads.idle:
+        idle.setdefault(cycle.between(low, high), {})[end.seat.joint] = None
+    for text, joints in idle.items():
+        what = f"no load presses the pins of {', '.join(joints)} {text}: they float in their play, and positions there "
+        what += "are not valid"
+        remedy = "expect impact where the load sets in"
+        yield Finding.note("contact.unloaded", "joints", what, remedy, joints=list(joints), at=text)
+    lost: dict[tuple[str, str], list[Crossing]] = {}
     for seat in run.seats:
-        joint, part = seat.joint, "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
+        joint, where = seat.joint, f"joints.{seat.joint}"
+        part = "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
         crossings = [cross for cross in loads.passages if cross.end.seat.joint == joint]
-        halts = [
-            (halt.low, halt.high) for halt in seating.halts
-            if halt.joint == joint and not any(halt.low <= cross.high and cross.low <= halt.high for cross in crossings)
-        ]  # fmt: skip
         if crossings:
-            places = [f"at {cycle.place(cross.time)}{ENDS[cross.end.place]}" for cross in crossings]
-            lost.setdefault((part, listed(places)), []).append(joint)
+            text = listed([f"at {cycle.place(cross.time)}{ENDS[cross.end.place]}" for cross in crossings])
+            lost.setdefault((part, text), []).extend(crossings)
         elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
             what = f"the {part} carries no load: it is at the middle of its play"
-            yield Finding.note("seat.unloaded", f"joints.{joint}", what, "state the seat, or seat: free", part=part)
+            yield Finding.note("seat.unloaded", where, what, "state the seat, or seat: free", part=part)
+        halts = [
+            cycle.between(halt.low, halt.high) for halt in seating.halts
+            if halt.joint == joint and not any(halt.low <= cross.high and cross.low <= halt.high for cross in crossings)
+        ]  # fmt: skip
         if halts:
-            spans = _joined(halts, APART * run.cycle.duration)
-            lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
-    for (part, text), names in lost.items():
-        crossings = [cross for cross in loads.passages if cross.end.seat.joint in names]
+            text = listed([*dict.fromkeys(halts)])
+            what = f"the {part} lifts off the wall {text}: the inertia force of the motion within the play exceeds the "
+            what += "load"
+            remedy = "forces there are those of a pin that stays in contact"
+            yield Finding.warning("contact.lifted", where, what, remedy, part=part, at=text)
+        late = unsettled & (at.arrays["contact_lost"][list(run.system.joints).index(joint)] > 0)
+        if np.any(late):
+            intervals, change = at.dial.intervals(np.flatnonzero(late)), np.max(at.arrays["seat_change"][late])
+            what = f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes by "
+            what += f"{change:.2g} times the clearance, for the load turns as the pin moves"
+            remedy = "the pin floats there: treat it as loss of contact"
+            yield Finding.warning("seat.unsettled", where, what, remedy, at=intervals, change=change)
+    for (part, text), crossings in lost.items():
+        names = list(dict.fromkeys(cross.end.seat.joint for cross in crossings))
         nearest = min(crossings, key=lambda cross: cross.least / cross.peak)
         least = nearest.least if nearest.least > NO_LOAD * nearest.peak else 0.0  # less than that is rounding
         what = f"the {part}{agreeing(len(names), ' loses', 's lose')} contact {text}: the load falls to "
-        what += (
-            f"{readable(least, 'N')} (peak {readable(nearest.peak, 'N')}) and reverses, and the pin would cross its "
-        )
-        what += "play"
-        figures = {"part": part, "count": len(names), "at": text, "least": least, "peak": nearest.peak}
-        where = f"joints.{', '.join(names)}"
-        yield Finding.warning("contact.lost", where, what, "expect impact there", **figures)
-    for (part, text), names in lifted.items():
-        what = f"the {part}{agreeing(len(names), ' lifts', 's lift')} off the wall {text}: the inertia force of the "
-        what += "motion within the play exceeds the load"
-        remedy = "forces there are those of a pin that stays in contact"
-        figures = {"part": part, "at": text, "count": len(names)}
-        yield Finding.warning("contact.lifted", f"joints.{', '.join(names)}", what, remedy, **figures)
-    joints = list(run.system.joints)
-    unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
-    for i in np.flatnonzero(np.any(unsettled, axis=1)):
-        intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
-        change = np.max(at.arrays["seat_change"][unsettled[i]])
-        what = f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes by {change:.2g} "
-        what += "times the clearance, for the load turns as the pin moves"
-        remedy = "the pin floats there: treat it as loss of contact"
-        figures = {"rounds": SEAT_ROUNDS, "at": intervals, "change": change}
-        yield Finding.warning("seat.unsettled", f"joints.{joints[i]}", what, remedy, **figures)
-
-
-def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
-    """The joints that bear no load over a range, with the end that does not where the other does."""
-    ranges: dict[str, dict[str, str]] = {}
-    for end, low, high in loads.idle:
-        ends = ranges.setdefault(cycle.between(low, high), {})
-        ends[end.seat.joint] = "" if end.seat.joint in ends else ENDS[end.place]
-    for text, ends in ranges.items():
-        what = f"no load presses the pins of {', '.join([name + end for name, end in ends.items()])} {text}: they "
-        what += "float in their play, and positions there are not valid"
-        remedy = "expect impact where the load sets in"
-        figures = {"joints": [name + end for name, end in ends.items()], "at": text}
-        yield Finding.note("contact.unloaded", "joints", what, remedy, **figures)
-
-
-def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[float, float]]:
-    """Times from and to, s, in their order; those that are hardly apart as one."""
-    joined: list[tuple[float, float]] = []
-    for low, high in sorted(spans):
-        if joined and low - joined[-1][1] <= apart:
-            joined[-1] = joined[-1][0], max(joined[-1][1], high)
-        else:
-            joined.append((low, high))
-    return joined
+        what += f"{readable(least, 'N')} (peak {readable(nearest.peak, 'N')}) and reverses, and the pin would cross "
+        what += "its play"
+        facts: dict[str, Any] = {
+            "part": part,
+            "count": len(names),
+            "at": text,
+            "least": least,
+            "peak": nearest.peak,
+        }
+        yield Finding.warning("contact.lost", f"joints.{', '.join(names)}", what, "expect impact there", **facts)
 
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (

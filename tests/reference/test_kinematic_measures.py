@@ -277,7 +277,8 @@ def test_both_engines_agree():
     values = mechanism.parameters({"dimensions.ab": np.array([[0.29], [0.3], [0.31]])})
     time = np.broadcast_to(np.linspace(0.0, 1.5, 9), (3, 9))
     kernel = kernel_of(run, measures, method)
-    one, other = (each.courses(values, time)[0] for each in (kernel, CompiledCourses(kernel)))
+    compiled = CompiledCourses(run, measures, method)
+    one, other = (each.courses(values, time)[0] for each in (kernel, compiled))
     for measure in measures:
         assert one[measure.name][0] == pytest.approx(other[measure.name][0], abs=1e-9)
 

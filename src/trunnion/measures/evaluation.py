@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,24 +25,9 @@ Curves = dict[str, tuple[Number, ...]]  # the parts of the course of each measur
 STEP, STEP_OF_NONE = 1e-3, 1e-4  # of a number, and of the size of the mechanism for one that is 0: of a difference
 
 
-class Kernel(Protocol):
-    """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s.
-
-    at_once: places that it takes best at a time; breaks: times, s, of each mechanism at which its courses may bend or
-    jump, None where these follow from those of the nominal one.
-    """
-
-    @property
-    def at_once(self) -> int: ...
-
-    def breaks(self, values: Values) -> list[Array] | None: ...
-
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]: ...
-
-
 @dataclass(frozen=True)
 class NumpyKernel:
-    """The analysis as it is, on arrays or dual numbers."""
+    """Evaluates batches, on arrays or dual numbers: values, (sample, 1) where they vary, and times, s."""
 
     run: Run
     measures: Sequence[Measure]
@@ -51,11 +35,12 @@ class NumpyKernel:
 
     @property
     def at_once(self) -> int:
-        """Places whose arrays stay in cache."""
+        """Places that it takes best at a time: their arrays stay in cache."""
         return CHUNK
 
     def breaks(self, values: Values) -> list[Array] | None:
-        """None: they follow from those of the nominal mechanism."""
+        """Times, s, of each mechanism at which its courses may bend or jump; None where they follow from those of the
+        nominal one."""
         return None
 
     @cached_property

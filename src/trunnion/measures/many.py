@@ -22,7 +22,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.errors import Status
-from trunnion.measures.evaluation import Kernel, SeatedKernel, lanes_of, picked, step_of
+from trunnion.measures.evaluation import NumpyKernel, SeatedKernel, lanes_of, picked, step_of
 from trunnion.measures.figures import Panels, Read, Reading, combined, turn
 from trunnion.measures.measures import Measure, angles, within
 from trunnion.measures.positions import ends_by_name, moved
@@ -83,7 +83,7 @@ class Group:
     measures: tuple[Measure, ...]
     ends: tuple[float, ...]
     values: Values
-    kernel: Kernel
+    kernel: NumpyKernel
     figures: dict[str, float]
 
     # ---- the nominal mechanism ----------------------------------------------------------------------------
@@ -608,7 +608,7 @@ class Many:
     """
 
     def __init__(
-        self, run: Run, measures: Sequence[Measure], values: Values, kernels: Callable[[Sequence[Measure]], Kernel]
+        self, run: Run, measures: Sequence[Measure], values: Values, kernels: Callable[[Sequence[Measure]], NumpyKernel]
     ) -> None:
         self.run, self.measures, self.values, self._kernels = run, tuple(measures), values, kernels
         self.figures: dict[str, float] = {}

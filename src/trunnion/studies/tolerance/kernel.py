@@ -17,7 +17,6 @@ from trunnion.dynamics.measured import MotionKernel, courses_in_time
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import (
     Curves,
-    Kernel,
     NumpyKernel,
     SeatedKernel,
     lanes_of,
@@ -116,26 +115,20 @@ class LoadedKernel(MotionKernel):
 
 
 @dataclass(frozen=True)
-class CompiledCourses:
-    """The same, compiled; what that cannot decide NumPy computes again. numpy: the kernel it stands for."""
-
-    numpy: NumpyKernel
+class CompiledCourses(NumpyKernel):
+    """The same, compiled; what that cannot decide NumPy computes again."""
 
     @property
     def at_once(self) -> int:
         """Places that it takes best at a time."""
         return AT_ONCE
 
-    def breaks(self, values: Mapping[str, Number]) -> None:
-        """None: they follow from those of the nominal mechanism."""
-
     @cached_property
     def _parts(self) -> dict[str, tuple[Measure, int]]:
         """Measure and number of each part of each course, by a name."""
-        kernel = self.numpy
-        back = kernel.solved(kernel.run.values, np.zeros(1))
-        counts = [len(measure.numbers(back)) for measure in kernel.measures]
-        pairs = zip(kernel.measures, counts, strict=True)
+        back = self.solved(self.run.values, np.zeros(1))
+        counts = [len(measure.numbers(back)) for measure in self.measures]
+        pairs = zip(self.measures, counts, strict=True)
         return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
 
     @cached_property
@@ -144,7 +137,7 @@ class CompiledCourses:
             return lambda back: measure.numbers(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
-        return WalkKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
+        return WalkKernel(self.run, figures, self.forces, self.method)
 
     def check(self, values: Mapping[str, Number]) -> None:
         """MechanismError for a mechanism that only NumPy takes."""
@@ -153,18 +146,18 @@ class CompiledCourses:
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
         """As `NumpyKernel.courses`; that takes dual numbers."""
         if any(isinstance(number, Dual) for number in (time, *values.values())):
-            return self.numpy.courses(values, time)
+            return super().courses(values, time)
         place = np.asarray(time, float)
         curves, status = self._compiled.curves(values, place)
-        numbers: Curves = {measure.name: () for measure in self.numpy.measures}
+        numbers: Curves = {measure.name: () for measure in self.measures}
         for name, (measure, _) in self._parts.items():
             numbers[measure.name] += (curves[name],)
         return {
             measure.name: tuple(
                 where_known(measure, status, part)
-                for part in measure.joined(numbers[measure.name], self.numpy.run, values, place)
+                for part in measure.joined(numbers[measure.name], self.run, values, place)
             )
-            for measure in self.numpy.measures
+            for measure in self.measures
         }, status
 
 
@@ -188,7 +181,7 @@ def engine_for(engine: Engine, kernel: NumpyKernel, values: Mapping[str, Number]
             what = f"the measure '{timed}' is of a motion in time, which the compiled engine does not have"
             raise MechanismError(Finding(what, "engine", "use numpy, or auto"))
         if engine == "auto":
-            CompiledCourses(kernel).check(values)
+            CompiledCourses(kernel.run, kernel.measures, kernel.friction).check(values)
     except MechanismError:
         if engine != "auto":
             raise
@@ -199,9 +192,9 @@ def engine_for(engine: Engine, kernel: NumpyKernel, values: Mapping[str, Number]
 def many_of(kernel: NumpyKernel, inputs: Inputs, engine: str = "numpy") -> Many:
     """The measures of the nominal mechanism, pins in the middle of their holes where they have no seat."""
 
-    def kernels(part: Sequence[Measure]) -> Kernel:
-        numpy = replace(kernel, measures=part)
-        return CompiledCourses(numpy) if engine == "compiled" else numpy
+    def kernels(part: Sequence[Measure]) -> NumpyKernel:
+        compiled = engine == "compiled"
+        return CompiledCourses(kernel.run, part, kernel.friction) if compiled else replace(kernel, measures=part)
 
     many = Many(kernel.run, kernel.measures, inputs.nominal, kernels)
     if not inputs.pressed:

@@ -100,7 +100,7 @@ class ActiveMotion(Integration):
             if crossing is not None and not self.solution.ended:
                 self._follow(time, row)
                 self.step = min(self._changed(crossing, row), self.step)
-        self.end("events", time, {"count": float(MOST_EVENTS)})
+        self._stop("events", time, row)
 
     def _begins(self, row: Array) -> bool:
         """Whether there are accelerations at the start; they also tell what rates are typical."""

@@ -51,26 +51,6 @@ def refuse_undetermined(run: Run, playing: Sequence[str] = ()) -> None:
         determinacy.refuse()
 
 
-def refuse_massless(motion: FreeMotion, row: Array) -> None:
-    """MechanismError where a force on some free coordinate would accelerate nothing: links without mass that no joint
-    holds. row: the state at the start."""
-    contacts, values = motion.contacts, motion.values
-    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(contacts))
-    matrix = motion.inertia(at)[:, :, 0] * motion.unit
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    with np.errstate(all="ignore"):
-        if np.all(scale > 0) and np.linalg.cond(matrix / scale[:, None] / scale) < SINGULAR:
-            return
-    keys = ["mass", *(f"inertia{axis}" for axis in ([".xx", ".yy", ".zz"] if motion.system.spatial else [""]))]
-    links = dict.fromkeys(link for contact in contacts for link in (contact.body, contact.other))
-    links.pop(motion.system.mechanism.fixed_link, None)
-    light = [link for link in links if not all(np.any(values.get(f"links.{link}.{key}", 0.0)) for key in keys)]
-    what = f"{', '.join(light or links)} has no mass, or no inertia about some axis, where nothing holds it while the "
-    what += f"pins of {', '.join(dict.fromkeys(contact.joint for contact in contacts))} are in play"
-    remedy = "state its mass and inertia, or let fewer of its joints be in play"
-    raise MechanismError(Finding(what, f"links.{(light or list(links))[0]}", remedy))
-
-
 def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
     """MechanismError for a start outside a range, at a change point, or where nothing moves that has a mass."""
 
@@ -89,9 +69,19 @@ def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float
             raise refused(first, f"at a change point: two assembly modes of the links {links} coincide there")
     rows = np.repeat(row[:, None], 2, axis=1)
     rows[0, 1] += BESIDE * (1.0 if motion.system.turns(first) else motion.size)
-    inertia, nearby = np.abs(motion.inertia(layout.moment(np.zeros(2), rows))[0, 0])
-    if not motion.several and inertia < MASSLESS * nearby:
-        raise refused(first, "where nothing moves that has a mass, as at a dead centre: it has no acceleration there")
+    mass, nearby = np.moveaxis(motion.inertia(layout.moment(np.zeros(2), rows)) * motion.unit[:, None], -1, 0)
+    inertia, beside = (np.abs(np.diag(np.nan_to_num(matrix))) for matrix in (mass, nearby))
+    scale = np.sqrt(inertia)
+    none = np.any(inertia <= MASSLESS * beside) or np.linalg.cond(mass / scale[:, None] / scale) >= SINGULAR
+    if not (none and np.all(np.isfinite(mass))):
+        return
+    keys = ["mass", *(f"inertia{axis}" for axis in ([".xx", ".yy", ".zz"] if motion.system.spatial else [""]))]
+    moving = [link for link in motion.system.mechanism.links if link != motion.system.mechanism.fixed_link]
+    light = [link for link in moving if not all(np.any(motion.values.get(f"links.{link}.{key}", 0.0)) for key in keys)]
+    what = "nothing moves that has a mass with some coordinate where it begins (no mass or no inertia: "
+    what += f"{', '.join(light) or 'none'}; a dead centre is such a place): it has no acceleration there"
+    where = f"links.{light[0]}" if motion.contacts and light else f"drivers.{first}"
+    raise MechanismError(Finding(what, where, "state the mass and inertia of its links, or begin elsewhere"))
 
 
 def _refused(mechanism: Mechanism) -> Iterator[Finding]:
@@ -102,16 +92,6 @@ def _refused(mechanism: Mechanism) -> Iterator[Finding]:
         what = "no driver is free, so there is no motion to find"
         yield Finding(what, where, "state a motor, such as motor: {kind: constant, effort: 4 N m}, or free: true")
         return
-    ground = f"links.{mechanism.fixed_link}."
-    inert = [
-        value
-        for path, value in mechanism.parameters().items()
-        if path.startswith(("links.", "drivers.")) and not path.startswith(ground)
-        and (".mass" in path or ".inertia" in path)
-    ]  # fmt: skip
-    if not np.any([np.any(value != 0) for value in inert]):
-        remedy = "state a mass or an inertia of a link that it moves, or the inertia of its motor"
-        yield Finding("no mass moves with it, so it has no acceleration", where, remedy)
     yield from _in_play(mechanism, playing)
     if len(free) < 2 and not playing:
         return
@@ -253,12 +233,9 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
             what += "and must be above 0"
             remedy = "lower the friction or the inertia behind the joints that lock; see `trunnion locking`"
             return Finding.error("simulate.no_acceleration", where, what, remedy, **figures)
-        case "unsolved":
-            what = f"the accelerations are not found at {at} ({state})"
+        case "unsolved" | "step" | "events":
+            what = f"the motion is not found beyond {at} ({state})"
             return Finding.error("simulate.unsolved", where, what, forces, **figures)
-        case "step":
-            what = f"the integration needs steps below rounding at {at} ({state})"
-            return Finding.error("simulate.step", where, what, forces, **figures)
         case "dead_centre":
             what = f"{driver} reaches its dead centre, {own['coordinate']:.6g} {unit}, at {at}: the links cannot be "
             what += f"assembled beyond it, and go on as {driver} reverses"
@@ -266,9 +243,6 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
         case "not_assembled":
             what = f"the links cannot be assembled beyond {at} ({state})"
             return Finding.error("simulate.not_assembled", where, what, dead, **figures)
-        case "events":
-            what = f"there are {own['count']:.0f} events up to {at}: the motion is not followed farther"
-            return Finding.error("simulate.events", where, what, **figures)
         case "change_point":
             what = f"at {at}, at {readable(own['coordinate'], unit)} of {driver}, the links {', '.join(own['links'])} "
             what += "come to a change point, where two of their assembly modes coincide: neither reactions nor what "

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import single
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.compiled_rates import Codes, rates_of
-from trunnion.dynamics.findings import check_start, motion_findings, refuse, refuse_massless, refuse_undetermined
+from trunnion.dynamics.findings import check_start, motion_findings, refuse, refuse_undetermined
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.impact_motion import integration_of
 from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
@@ -130,8 +130,6 @@ def simulated(
         tolerance = max(tolerance, FINEST)
     load_places, row, rates = places(motion, mechanism.drivers), initial_row(motion), rates_of(motion)
     check_start(motion, row, load_places.limits)
-    if playing:
-        refuse_massless(motion, row)
     time = np.linspace(0.0, duration, steps + 1)
 
     def found(tolerance: float) -> Found:

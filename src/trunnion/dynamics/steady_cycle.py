@@ -1,8 +1,7 @@
 """The steady cycle of a mechanism that goes round by its motors: the motion that repeats itself, cycle after cycle.
 
 Shooting: with P(x) the state one cycle of the first free driver after the state x, the steady motion is x = P(x). It is
-found by Newton's method from the last cycle of a run-up, ∂P/∂x by differences, with natural monotonicity (P. Deuflhard,
-Newton Methods for Nonlinear Problems, Springer 2004, section 3.3). Its eigenvalues say what is left of a
+found by Newton's method from the last cycle of a run-up, ∂P/∂x by differences. Its eigenvalues say what is left of a
 difference after a cycle (A. H. Nayfeh, B. Balachandran, Applied Nonlinear Dynamics, Wiley 1995, sections 2.3 and 6.5).
 What was found becomes the motion law of the drivers (`Repeated`), so that the cycle is analysed as any other.
 """
@@ -92,7 +91,6 @@ REPEATED = 1e-8  # of the state: by how much the end of a steady cycle may miss 
 SURE = 1e-7  # of the state: the step that is the last, for Newton's method converges faster than by any factor
 NOISE = 5.0  # times the tolerance: a miss that says nothing
 ROUNDS = 15  # of Newton's method
-HALVED = (1.0, 0.5, 0.25, 0.125)  # of its step, until the next with the same derivatives is shorter [Deuflhard]
 FAR = 20.0  # times the speed at the end of the run-up: the steady speed is not looked for beyond
 NUDGE = 1e-4  # of the state, by which ∂P/∂x is taken
 INDIFFERENT = 1e-6  # what is left of a difference beyond all of it, but for rounding
@@ -239,12 +237,9 @@ def _steady_cycle(
         figures = {"driver": name, "turns": turns, "time": solution.end}
         none = Finding.error("simulate.not_round", f"drivers.{name}", what, remedy, **figures)
         raise UnsteadyError([none, *motion_findings(motion, solution, motion.run)])
-    takes = [course.when(course.travel - k * TURN) for k in range(3)]
-    before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
-    what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after {after}, changes by "
-    what += f"{readable(last - before, 'rad/s')} a turn, and no speed is found that comes back"
+    what = f"there is no steady cycle: {name} goes round for {after}, and no speed is found that comes back"
     remedy = "check that its losses grow with the speed or that its motor's effort falls; or give it more --time"
-    figures = {"driver": name, "speed": last, "change": last - before, "time": solution.end}
+    figures = {"driver": name, "time": solution.end}
     raise UnsteadyError([Finding.error("simulate.not_repeating", f"drivers.{name}", what, remedy, **figures)])
 
 
@@ -309,30 +304,23 @@ class Section:
     def repeated(self) -> SteadyCycle | None:
         """The state that comes back, from the last one of the run-up, with the eigenvalue that says what is left of a
         difference; None if it is not found."""
-        state = self.row[self.which].copy()
-        speed, passage = self.which == self.layout.coordinates + self.first, self.after(state)
+        state = begin = self.row[self.which]
+        speed, factor = self.which == self.layout.coordinates + self.first, np.nan
+        last = False
         for _ in range(ROUNDS):
+            passage = self.after(state) if 1 / FAR < (state / begin)[speed][0] < FAR else None
             if passage is None:
                 return None
+            miss, solution = passage
+            if last:
+                most = float(np.max(np.abs(miss)))
+                return SteadyCycle(solution, self.first, most, factor) if most <= REPEATED else None
             near_by = [self.after(state + nudge) for nudge in np.diag(NUDGE * self.scale)]
-            slopes = np.transpose([(other[0] - passage[0]) / NUDGE for other in near_by if other is not None])
+            slopes = np.transpose([(other[0] - miss) / NUDGE for other in near_by if other is not None])
             if slopes.shape != (len(state), len(state)):  # a state near by does not come back
                 return None
-            step = -np.linalg.lstsq(slopes, passage[0], rcond=None)[0]
-            if np.max(np.abs(step)) <= SURE or np.max(np.abs(passage[0])) <= NOISE * self.tolerance:
-                passage = self.after(state + step * self.scale)
-                if passage is None or (most := float(np.max(np.abs(passage[0])))) > REPEATED:
-                    return None
-                factor = float(np.max(np.abs(np.linalg.eigvals(slopes + np.eye(len(state))))))
-                return SteadyCycle(passage[1], self.first, most, factor)
-            for size in HALVED:
-                tried = state + size * step * self.scale
-                share = tried[speed][0] / self.row[self.which][speed][0]
-                passage = self.after(tried) if 1 / FAR < share < FAR else None
-                if passage is None:
-                    continue
-                simplified = np.linalg.lstsq(slopes, passage[0], rcond=None)[0]
-                if np.linalg.norm(simplified) < np.linalg.norm(step):
-                    break
-            state = tried
+            factor = float(np.max(np.abs(np.linalg.eigvals(slopes + np.eye(len(state))))))
+            step = -np.linalg.lstsq(slopes, miss, rcond=None)[0]
+            last = bool(np.max(np.abs(step)) <= SURE or np.max(np.abs(miss)) <= NOISE * self.tolerance)
+            state = state + step * self.scale
         return None

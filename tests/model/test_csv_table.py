@@ -349,7 +349,7 @@ def test_units_below_the_headers_and_numbers_of_si(text, points, tmp_path):
         ("file: gas.csv, period: 340 deg", MEASURED, "tables.pressure.period: is 5.93"),
         ("file: gas.csv, period: 2 s", MEASURED, "is a time where an angle is needed"),
         ("interpolation: linear", CSV, "tables.pressure: has no points"),
-        ("file: gas.csv, points: [[0 deg, 1 bar], [360 deg, 1 bar]]", CSV, "states both points and a file"),
+        ("file: gas.csv, points: [[0 deg, 1 bar], [360 deg, 1 bar]]", CSV, "is stated beside file"),
     ],
 )
 def test_a_table_of_a_file_stated_wrongly(stated, text, words, tmp_path):

@@ -128,7 +128,7 @@ MISTAKES = {
         "  AB: {model": [("  t: {model", "costs.t", "'dimensions.t' has no tolerance")],
         "  A.clearance: {model": [
             ("  D.clearance: {model", "costs.D.clearance", "states no clearance"),
-            ("  C.clearance: {model", "costs.C.clearance", "its play is that of its radii"),
+            ("  C.clearance: {model", "costs.C.clearance", "states no clearance"),
             ("  B.pin.clearance: {model", "costs.B.pin", "has no tolerance"),
             ("  dimensions.AB: {model", "costs.dimensions.AB", "are the same")],
         "model: power, B: 1, k: 1, unit: m": [("process: boring", "costs.A.clearance.process", "a play has no IT")],

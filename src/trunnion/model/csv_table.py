@@ -66,9 +66,9 @@ def with_points(
         try:
             section, key = _holder(data, name)
             entry, where = changed[section][key], f"{section}.{key}"
-            path, label, columns = Path(file), str(file), None
+            path, columns = Path(file), None
             if model:
-                path, label, columns = _own_path(entry, where, model), str(model.parent / file), entry.get("columns")
+                path, columns = in_folder(model.resolve().parent, str(file), f"{where}.file"), entry.get("columns")
                 size = path.stat().st_size + sum(Path(points.file).stat().st_size for points in read)
                 rows = sum(len(points.rows) for points in read)
                 if len(named_files) > MOST_FILES or size > MAX_BYTES or rows > MAX_OWN_ROWS:
@@ -76,6 +76,7 @@ def with_points(
                     what += f"over {MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
                     findings.append(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))
                     break
+            label = str(model.parent / file if model else file)
             points = _points(path, f"{where}.points", _kinds(data, section, key), label, columns)
         except MechanismError as error:
             findings += error.findings
@@ -88,17 +89,6 @@ def with_points(
     if findings:
         raise MechanismError(findings)
     return changed, read
-
-
-def _own_path(entry: Mapping[str, Any], where: str, model: Path) -> Path:
-    """The file that an entry of a model names; MechanismError for keys that do not go with it."""
-    names = entry.get("columns")
-    if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
-        what, remedy = "is not the headers of two columns", "write two texts: columns: [time, pressure]"
-        raise MechanismError(Finding(what, f"{where}.columns", remedy))
-    if "points" in entry:
-        raise MechanismError(Finding("states both points and a file", where))
-    return in_folder(model.resolve().parent, entry["file"], f"{where}.file")
 
 
 def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> list[Finding]:
@@ -314,13 +304,18 @@ _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT"
 
 
 def stated_files(data: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Section, name and file of every table, and driver of law `table`, that names a file."""
+    """Section, name and file of every table, and driver of law `table`, that names a file.
+
+    Those stated wrongly are left to the sections' classes.
+    """
     for section in ("drivers", "tables"):
         entries = data.get(section)
         for name, entry in entries.items() if isinstance(entries, Mapping) else ():
-            if not isinstance(entry, Mapping) or not isinstance(entry.get("file"), str):
-                continue  # what is no text is a finding of the sections' classes
-            if section == "tables" or entry.get("law") == "table":
+            if not isinstance(entry, Mapping) or not isinstance(entry.get("file"), str) or "points" in entry:
+                continue
+            columns = entry.get("columns", ["", ""])
+            texts = isinstance(columns, list) and list(map(type, columns)) == [str, str]
+            if texts and (section == "tables" or entry.get("law") == "table"):
                 yield section, str(name), entry["file"]
 
 

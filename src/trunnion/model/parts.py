@@ -180,7 +180,9 @@ class Driver(Part):
     return_duration: Annotated[Time | None, Positive, OnlyWith("returns")] = None
     dwell: Annotated[Time | None, NotNegative] = None
     returns: bool = True
-    points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2), Rising("time")] | None = None
+    points: (
+        Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2), Rising("time"), NotWith("file")] | None
+    ) = None
     file: str | None = None
     columns: _Columns = None
     periodic: bool = False
@@ -266,7 +268,9 @@ class Table(Part):
     """
 
     over: Literal["drive", "time"] = "drive"
-    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2), Rising("at")] = ()
+    points: Annotated[
+        tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2), Rising("at"), NotWith("file")
+    ] = ()
     file: str | None = None
     columns: _Columns = None
     interpolation: Literal["linear", "spline"] = "linear"

@@ -128,10 +128,8 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     elif kind == "literal_error" and key.startswith("trunnion"):
         what, remedy = f"the file is of version {error['input']!r}, this program reads 1", f"write {key}: 1"
     elif kind == "literal_error":
-        wrong = f"'{error['input'][:40]}' " if isinstance(error["input"], str) else ""
-        what, remedy = f"{wrong}is not one of {context['expected']}", "write one of these"
-        near = nearest(str(error["input"]), re.findall(r"'([^']*)'", context["expected"]))
-        remedy = near if near.startswith("did you mean") else remedy
+        word, words = str(error["input"])[:40], re.findall(r"'([^']*)'", context["expected"])
+        what, remedy = f"'{word}' is not one of {context['expected']}", nearest(word, words)
     elif kind in _MEANINGS:
         what, remedy = (text.format(**{"key": key, **context}) for text in _MEANINGS[kind])
     else:

@@ -142,17 +142,15 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
         main = f"{main.strip()} {unit}"
     if not unit and not value and kind.dimensions != KINDS["number"].dimensions:
         raise UnitError(f"the tolerance in '{text}' has no unit", "write the unit of the tolerance, such as ± 0.05 mm")
-    found_dimension = parse(main).dimension({}) if value else None
+    dimension = parse(main).dimension({}) if value else None
     deviations = []
     for number, own_unit in terms:
         deviation = literal(number.lstrip("-+"), own_unit or unit)
-        what = f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}"
-        if found_dimension is not None and not (
-            fits(deviation.dimension, found_dimension) and fits(found_dimension, deviation.dimension)
-        ):
-            raise UnitError(f"{what}, the value {dimension_text(found_dimension)}", "give both the same unit")
-        if (own_unit or unit) and not kind.accepts(deviation.dimension):
-            raise UnitError(what)
+        alike = dimension is None or (fits(deviation.dimension, dimension) and fits(dimension, deviation.dimension))
+        if not alike or ((own_unit or unit) and not kind.accepts(deviation.dimension)):
+            beside = f", the value {dimension_text(dimension)}" if dimension else ""
+            what = f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}{beside}"
+            raise UnitError(what, "give both the same unit")
         deviations.append(-deviation.value if number.startswith("-") else deviation.value)
     if len(deviations) == 1:
         if terms[0][0][0] in "-+":

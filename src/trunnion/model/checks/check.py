@@ -170,21 +170,19 @@ def _hints(mechanism: Varying) -> Iterator[Finding]:
     """Whether each hint of the assembly is of something that it can place."""
     moving = [link for link in mechanism.points if link != mechanism.fixed_link]
     for name, hint in mechanism.assembly.items():
-        where, joint = f"assembly.{name}", mechanism.effective_joints.get(name)
-        pair, position = joint.pair if joint else None, isinstance(hint, tuple)
-        if isinstance(hint, str):
-            if name not in moving:
-                what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
-                yield Finding(what, where, nearest(name, moving))
-        elif name == AT and joint is None:
-            if position or not mechanism.drivers:
-                what = "it says where the driver is when points are where the hints say"
-                yield Finding(what, where, "write its coordinate, as at: 30 deg" if mechanism.drivers else "remove it")
-        elif "." in name and not position:
-            yield Finding("a point has a position, not an angle", where, f"write {mechanism.position_form}")
-        elif joint and pair and not position and not (joint.pair.motions or pair.crossed):
-            what = f"one number does not state how far a {joint.type} joint has moved"
-            yield Finding(what, where, f"state where it is: {mechanism.position_form}")
+        joint, word = mechanism.effective_joints.get(name), isinstance(hint, str)
+        number, of_driver = not isinstance(hint, tuple | str), name == AT and joint is None
+        yield from faults(
+            f"assembly.{name}",
+            (word and name not in moving, "", f"'{hint}' chooses an assembly of a moving link, and '{name}' is none",
+             nearest(name, moving)),
+            (of_driver and not word and not (number and mechanism.drivers), "",
+             "it says where the driver is when points are where the hints say", "write its coordinate, as at: 30 deg"),
+            ("." in name and number, "", "a point has a position, not an angle", f"write {mechanism.position_form}"),
+            (joint and number and not (joint.pair.motions or joint.pair.crossed), "",
+             f"one number does not state how far a {joint and joint.type} joint has moved",
+             f"state where it is: {mechanism.position_form}"),
+        )  # fmt: skip
 
 
 # ---- numbers --------------------------------------------------------------------------------------------------

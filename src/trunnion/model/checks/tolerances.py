@@ -178,11 +178,10 @@ def cost_values(mechanism: Varying) -> Iterator[Finding]:
     for name, cost in mechanism.costs.items():
         where, paths = f"costs.{name}", mechanism.cost_paths(name)
         if not paths:  # neither a number with a tolerance nor a clearance
-            joint = mechanism.effective_joints.get(name.removeprefix("joints.").removesuffix(".clearance"))
-            if joint and name.endswith(".clearance"):
-                derived = joint.pin is not None and (joint.pin.fit is not None or joint.pin.hole_radius is not None)
-                what = f"the joint of '{name}' states no clearance" + ": its play is that of its radii" * derived
-                yield Finding(what, where, "state clearance: 0.02 mm of its pin or guide")
+            joint, _, key = name.removeprefix("joints.").rpartition(".")
+            if joint in mechanism.effective_joints and key == "clearance":
+                remedy = "state clearance: 0.02 mm of its pin or guide, instead of its radii or a fit"
+                yield Finding(f"the joint of '{name}' states no clearance", where, remedy)
             else:
                 nothing = Finding(f"no joint follows '{name}'", where, "name the number of a joint")
                 yield from meant(mechanism, "costs", [name])[1] or [nothing]

@@ -37,15 +37,13 @@ def rewrite_mechanism(
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
     text = ""
     if {source.suffix.lower(), path.suffix.lower()} <= YAMLS:
-        with suppress(*UNFORESEEN):
-            text = _edited_source(mechanism, source, path)
+        with suppress(OSError, MechanismError):  # of a source that is there no more
+            text = changed_text(source.read_text("utf-8"), _naming_files(mechanism, source, path))
     with whole(path) as temporary:
         if text:
             temporary.write_text(text, encoding="utf-8", newline="\n")
-            with suppress(MechanismError):
-                if read_mechanism(temporary) == mechanism:
-                    return
-        mechanism.write(temporary)
+        else:
+            mechanism.write(temporary)
 
 
 def changed_text(text: str, after: Mapping[str, Any]) -> str:
@@ -61,19 +59,19 @@ def changed_text(text: str, after: Mapping[str, Any]) -> str:
     return text_of(after)
 
 
-def _edited_source(mechanism: Mechanism, source: Path, path: Path) -> str:
-    """The text of the source with what is different in the mechanism.
-
-    The source goes on to name its files of points, if these are the same and `path` is in its folder.
+def _naming_files(mechanism: Mechanism, source: Path, path: Path) -> dict[str, Any]:
+    """The data of the mechanism, which go on to name files of points where these are the same and `path` is beside
+    the source.
     """
-    text, before, entries = source.read_text("utf-8"), read_mechanism(source).data(), read_entries(source)[0]
-    after, same_folder = mechanism.data(), source.resolve().parent == path.resolve().parent
-    for section, name, _ in stated_files(entries):
-        entry = before[section][name]
-        if not same_folder or after.get(section, {}).get(name, {}).get("points") != entry.get("points"):
+    data, entries = mechanism.data(), read_entries(source)[0]
+    files = [*stated_files(entries)] if source.resolve().parent == path.resolve().parent else []
+    before = read_mechanism(source).data() if files else {}
+    for section, name, _ in files:
+        entry = data.get(section, {}).get(name, {})
+        if entry.get("points") == before[section][name]["points"]:
             of_the_file = {key: value for key, value in entries[section][name].items() if key in OF_A_FILE}
-            before[section][name] = {key: value for key, value in entry.items() if key != "points"} | of_the_file
-    return _edited(text, before, after)
+            data[section][name] = {key: value for key, value in entry.items() if key != "points"} | of_the_file
+    return data
 
 
 # ---- where the text changes -----------------------------------------------------------------------------------

@@ -96,20 +96,12 @@ def _refused(mechanism: Mechanism) -> Iterator[Finding]:
     if len(free) < 2 and not playing:
         return
     values, joints = mechanism.parameter_set.nominal, mechanism.effective_joints
-    rough = next((name for name in playing if (contact := joints[name].contact) is not None and contact.of.rigid
-                  and values.get(f"joints.{name}.friction.coefficient", 0.0) != 0.0), "")  # fmt: skip
+    rough = any(contact.of.rigid and values.get(f"joints.{name}.friction.coefficient", 0.0) != 0.0
+                for name in playing if (contact := joints[name].contact) is not None)  # fmt: skip
     for where, joint in _resisting(mechanism, free):
-        what = ""
-        if where.endswith(".clutch"):
-            what = "a clutch that may slip is solved with one free coordinate, and without joints in play"
-        elif joint in playing:
-            what = f"it may hold joint {joint}, which is in play"
-        elif rough:
-            what = f"it may hold joint {joint} beside friction between rigid bodies in {rough}; how they share is not "
-            what += "solved"
-        elif joints[joint].pair.count != 1:
-            what = f"it may hold joint {joint}, which has more than one freedom, and {len(free)} coordinates are free"
-        if what:
+        if where.endswith(".clutch") or joint in playing or rough or joints[joint].pair.count != 1:
+            what = f"it may slip or hold joint {joint}, and more than one coordinate is free: this is not solved for a "
+            what += "clutch, a joint in play or of several freedoms, nor beside friction between rigid bodies in play"
             yield Finding(what, where, f"leave it out, or use a law that is smooth at rest: {', '.join(SMOOTH)}")
 
 

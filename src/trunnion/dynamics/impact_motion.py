@@ -14,7 +14,7 @@ cases change by the worst place first, see `active_set.settled`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -27,11 +27,8 @@ from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.active_set import MEET as SLOW
 from trunnion.dynamics.active_set import RowMode, RowModes, settled
 from trunnion.dynamics.bordered import nearest
-from trunnion.dynamics.integrate import MOST_EVALUATIONS
-from trunnion.dynamics.rates import Dynamics
 from trunnion.dynamics.solution import Impact
-from trunnion.dynamics.start import Places, load_times
-from trunnion.dynamics.state import FreeMotion, Linear, Mode, Moment
+from trunnion.dynamics.state import FreeMotion, Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset, least_clearance
 
 Array = NDArray[np.float64]
@@ -362,14 +359,6 @@ class ImpactMotion(ActiveMotion):
         return "no_contact_force" if cause == "no_acceleration" and any(self.onsets) else cause
 
 
-def integration_of(
-    motion: FreeMotion, rates: Dynamics, load_places: Places, duration: float, tolerance: float,
-    progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS, start: float = 0.0,
-    mode: Mode | None = None,
-) -> ActiveMotion:  # fmt: skip
-    """What integrates a motion. duration, evaluations, start, mode: see `Integration`."""
-    kind = ImpactMotion if any(contact.rigid for contact in motion.contacts) else ActiveMotion
-    return kind(
-        motion, rates, duration, tolerance, load_places, progress, load_times(motion, duration),
-        evaluations, mode or Mode(), start,
-    )  # fmt: skip
+def integrator_of(motion: FreeMotion) -> type[ActiveMotion]:
+    """What integrates a motion."""
+    return ImpactMotion if any(contact.rigid for contact in motion.contacts) else ActiveMotion

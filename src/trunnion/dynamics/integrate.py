@@ -12,7 +12,7 @@ What holds, slips and is open until then: see `active_motion`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,7 +25,7 @@ from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.guards import Guards, dead_centre
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, kinetic_energy
 from trunnion.dynamics.solution import Ended, Event, Solution
-from trunnion.dynamics.start import Places
+from trunnion.dynamics.start import Places, times_of_loads
 from trunnion.dynamics.state import FreeMotion, Mode, Moment
 from trunnion.errors import Status
 from trunnion.solve.backward import pose_status
@@ -47,9 +47,9 @@ MEETING = 1e-3  # likewise, of a bend at which assemblies meet: the digits of th
 class Integration:
     """One motion from its initial state.
 
-    progress: told the share of the duration that is reached; times: s, at which a load jumps or bends; evaluations: of
-    the forces, at most, a walk counted as several; start: time, s, at which it begins; duration: at which it ends;
-    mode: what is so until something switches; resting: whether all free coordinates rest.
+    progress: told the share of the duration that is reached; evaluations: of the forces, at most, a walk counted as
+    several; start: time, s, at which it begins; duration: at which it ends; mode: what is so until something switches;
+    resting: whether all free coordinates rest.
     """
 
     motion: FreeMotion
@@ -58,7 +58,6 @@ class Integration:
     tolerance: float
     places: Places = field(default_factory=Places)
     progress: Callable[[float], None] | None = None
-    times: Sequence[float] = ()
     evaluations: int = MOST_EVALUATIONS
     mode: Mode = field(default_factory=Mode)
     start: float = 0.0
@@ -70,7 +69,8 @@ class Integration:
         self.layout, self.bends = Layout.of(self.motion), self.places.bends
         self.solution = Solution(self.layout)
         switch_times = [time for drive in self.motion.drives.values() for time in drive.times]
-        times = {time for time in (*switch_times, *self.times) if self.start < time < self.duration}
+        load_times = times_of_loads(self.motion, self.duration)
+        times = {time for time in (*switch_times, *load_times) if self.start < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
         self.turned_over, self.asked_for = 0.0, 0
         self.last = self.start, np.empty(0)  # time and row from which it is to go on

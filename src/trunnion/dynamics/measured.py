@@ -20,7 +20,7 @@ from trunnion.algebra.dual import Dual, derivative, primal, single
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_POINTS, ORDER
 from trunnion.dynamics.compiled_rates import Codes, rates_of
-from trunnion.dynamics.impact_motion import integration_of
+from trunnion.dynamics.impact_motion import integrator_of
 from trunnion.dynamics.solution import Solution, over_steps, step_nodes
 from trunnion.dynamics.start import CYCLES, initial_row, places
 from trunnion.dynamics.state import FreeMotion
@@ -263,7 +263,7 @@ def figures_in_time(
             if any(not low <= row[motion.names.index(name)] <= high for name, (low, high) in limits):
                 continue
             rates = rates_of(motion, codes, varied)
-            solution = integration_of(motion, rates, load_places, duration, tolerance).run(row)
+            solution = integrator_of(motion)(motion, rates, duration, tolerance, load_places).run(row)
         except MechanismError:
             continue
         if solution.ended is None and solution.stretches:

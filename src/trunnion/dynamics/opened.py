@@ -36,6 +36,7 @@ from trunnion.model.parts import Driver
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.run import Run
 from trunnion.structure.decompose import decompose, mobility_by_formula
+from trunnion.structure.graph import reached
 from trunnion.structure.passive import passive
 
 Array = NDArray[np.float64]
@@ -144,16 +145,14 @@ def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
 
 def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
-    part, mass = {link: {link} for link in data["links"]}, mechanism.parameters()
-    for joint in data["joints"].values():
-        first, other = (part[link] for link in joint["links"])
-        if first is not other:
-            first |= other
-            part.update(dict.fromkeys(other, first))
-    loose = {id(links): links for links in part.values() if mechanism.fixed_link not in links}
+    pairs, mass = [joint["links"] for joint in data["joints"].values()], mechanism.parameters()
+    parts = [
+        reached([link], lambda link: (at for pair in pairs if link in pair for at in pair)) for link in data["links"]
+    ]
     return [
-        max((link for link in mechanism.links if link in links), key=lambda link: mass[f"links.{link}.mass"])
-        for links in loose.values()
+        max((link for link in mechanism.links if link in part), key=lambda link: mass[f"links.{link}.mass"])
+        for part in dict.fromkeys(map(frozenset, parts))
+        if mechanism.fixed_link not in part
     ]
 
 

@@ -15,7 +15,7 @@ from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.compiled_rates import Codes, rates_of
 from trunnion.dynamics.findings import check_start, motion_findings, refuse, refuse_undetermined
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.impact_motion import integration_of
+from trunnion.dynamics.impact_motion import integrator_of
 from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
 from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play, opened
@@ -134,7 +134,7 @@ def simulated(
 
     def found(tolerance: float) -> Found:
         motion.begin(None)
-        integration = integration_of(motion, rates, load_places, duration, tolerance, progress, evaluations)
+        integration = integrator_of(motion)(motion, rates, duration, tolerance, load_places, progress, evaluations)
         solution = integration.run(row.copy())
         return Found.of(run, solution, time, lambda when: filled(motion, solution, when, bare))
 
@@ -245,8 +245,8 @@ class Continued:
             self.motion = replace(self.motion, run=run, drives=drives(run.system, values))
             self._rates, self._applied = rates_of(self.motion, self._codes, self._varied), dict(self.inputs)
         self.motion.begin(self._snapshot)
-        integration = integration_of(
-            self.motion, self._rates, self._places, until, self.tolerance, start=self.time, mode=self._mode
+        integration = integrator_of(self.motion)(
+            self.motion, self._rates, until, self.tolerance, self._places, mode=self._mode, start=self.time
         )
         integration.run(self._row.copy())
         return integration

@@ -46,7 +46,7 @@ def initial_row(motion: FreeMotion) -> Array:
     return row
 
 
-def load_times(motion: FreeMotion, duration: float) -> list[float]:
+def times_of_loads(motion: FreeMotion, duration: float) -> list[float]:
     """Times, s, at which loads that vary with the time jump or bend: ends of a `between`, points of a table."""
     mechanism = motion.system.mechanism
     instants, grid = list[float](), np.linspace(0.0, duration, SCANNED)

@@ -22,7 +22,7 @@ from trunnion.cycle import summary
 from trunnion.cycle.positions import positions
 from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.findings import motion_findings
-from trunnion.dynamics.impact_motion import integration_of
+from trunnion.dynamics.impact_motion import integrator_of
 from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
 from trunnion.dynamics.measured import BACKWARD, SPEED, TURN, DriveCourse
 from trunnion.dynamics.opened import in_play
@@ -212,7 +212,7 @@ def _steady_cycle(
     unstable = None  # one that no run-up comes to, unless it begins there
     for longer in LONGER:
         end = longer * duration
-        integration = integration_of(motion, rates, load_places, end, tolerance, progress, evaluations)
+        integration = integrator_of(motion)(motion, rates, end, tolerance, load_places, progress, evaluations)
         solution = integration.run(initial_row(motion))
         if not solution.end > 0.0:
             raise UnsteadyError(motion_findings(motion, solution, motion.run))
@@ -284,7 +284,9 @@ class Section:
         for longer in (1.5, 6.0, 24.0):
             self.motion.begin(self.snapshot)
             duration = longer * self.takes
-            solution = integration_of(self.motion, self.rates, self.places, duration, self.tolerance).run(row)
+            solution = integrator_of(self.motion)(self.motion, self.rates, duration, self.tolerance, self.places).run(
+                row
+            )
             if not solution.end > 0.0:
                 return None
             course = DriveCourse.of(self.motion, solution, self.first)

@@ -19,11 +19,9 @@ from trunnion.version import __version__
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
-if TYPE_CHECKING:
-    pass
 
 _AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
-KEPT = "variables"  # the attribute of a result that has not kept every variable
+KEPT = "kept_variables"  # the attribute of a result that has not kept every variable
 # names of figures that say how well a result is solved, and nothing of the mechanism
 NUMERICAL = ("efficiency_error", "power_residual", "friction_iterations", "seat_rounds")
 MORE_THAN = "more than"  # the aspect of a figure that is known from below only
@@ -126,10 +124,9 @@ def plain(value: Any) -> Any:
 
 def whole(result: Described, what: str) -> None:
     """MechanismError for something that is made of all variables of a result, of one that has not kept them."""
-    marker = next((result.attrs[name] for name in (KEPT, f"kept_{KEPT}") if name in result.attrs), None)
-    if marker is not None:  # the other name is that of a NetCDF 3 file
-        message = f"this result has kept {len(json.loads(marker))} of its variables: {what} is made of all"
-        raise MechanismError(Finding(message, KEPT, "analyse without naming variables"))
+    if KEPT in result.attrs:
+        message = f"this result has kept {len(attribute(result, KEPT))} of its variables: {what} is made of all"
+        raise MechanismError(Finding(message, "variables", "analyse without naming variables"))
 
 
 def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from trunnion.files import whole
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import guarded
 from trunnion.model.units import TableUnits
-from trunnion.results.attributes import KEPT, plain
+from trunnion.results.attributes import plain
 from trunnion.results.dataset import Column
 from trunnion.results.tables import KINDS, in_model_units, kind_of, selected, table_of
 from trunnion.results.tables import columns as flat_columns
@@ -80,9 +80,6 @@ def _parquet(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) 
 def _netcdf(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     four = all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))  # else NetCDF 3
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if four else "scipy"
-    if engine == "scipy" and KEPT in result.attrs:  # SciPy's writer takes this name for its own variables
-        result = result.copy(deep=False)
-        result.attrs[f"kept_{KEPT}"] = result.attrs.pop(KEPT)
     try:
         made = result.to_netcdf(engine=engine)
     except ValueError:  # of an xarray that cannot make it in memory

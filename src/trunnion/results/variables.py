@@ -41,24 +41,9 @@ def _motion(dims: Dims, unit: str, long_name: str, column: str, space: str = "",
     return Variable(dims, unit, long_name, space=space, column=column, tables=tables)
 
 
-def _rest(
-    dims: Dims, unit: str, long_name: str, dtype: type[Any] = np.float64, part: str = "", column: str = ""
-) -> Variable:  # fmt: skip
-    """What only the table of everything has."""
-    return Variable(dims, unit, long_name, dtype, part, column=column, tables="rest")
-
-
-def _seat(
-    dims: Dims, unit: str, long_name: str, column: str | None = None, dtype: type[Any] = np.float64
-) -> Variable:  # fmt: skip
-    """What only mechanisms whose pins have seats have."""
-    return Variable(dims, unit, long_name, dtype, "seats", column=column)
-
-
-def _error(dims: Dims, unit: str, long_name: str, column: str) -> Variable:
-    """What only mechanisms with errors have."""
-    return Variable(dims, unit, long_name, part="errors", column=column)
-
+_rest = functools.partial(Variable, column="", tables="rest")  # what only the table of everything has
+_seat = functools.partial(Variable, part="seats")  # what only mechanisms whose pins have seats have
+_error = functools.partial(Variable, part="errors")  # what only mechanisms with errors have
 
 J, D, S, NOTHING = ("joint",), ("driver",), ("spring",), ()
 JA, LA, PA, JE = ("joint", "axis"), ("link", "axis"), ("point", "axis"), ("joint", "end", "axis")
@@ -126,23 +111,24 @@ VARIABLES: dict[str, Variable] = {
         NOTHING, "1", "contraction of the friction iteration; from 1 on it may diverge"),
     "locking_margin": _rest(NOTHING, "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
     "status": Variable(NOTHING, "1", "code of the position's status; see the attribute flag_meanings", np.int8),
-    "point_error": _error(PA, "m", "place of the point against the ideal mechanism", "error"),
+    "point_error": _error(PA, "m", "place of the point against the ideal mechanism", column="error"),
     "link_error": _rest(
         ("link",), "rad", "angle of the link against the ideal mechanism", part="errors", column="angle_error"),
-    "joint_rotation_error": _error(J, "rad", "rotation of the joint against the ideal mechanism", "rotation_error"),
-    "joint_slide_error": _error(J, "m", "slide of the joint against the ideal mechanism", "slide_error"),
-    "reaction_force_change": _error(JA, "N", "reaction less that of the ideal mechanism", "reaction_change"),
-    "drive_effort_change": _error(D, "effort", "drive effort less that of the ideal mechanism", "effort_change"),
+    "joint_rotation_error": _error(
+        J, "rad", "rotation of the joint against the ideal mechanism", column="rotation_error"),
+    "joint_slide_error": _error(J, "m", "slide of the joint against the ideal mechanism", column="slide_error"),
+    "reaction_force_change": _error(JA, "N", "reaction less that of the ideal mechanism", column="reaction_change"),
+    "drive_effort_change": _error(D, "effort", "drive effort less that of the ideal mechanism", column="effort_change"),
     "friction_power_change": _rest(
         J, "W", "power lost to friction less that of the ideal mechanism", part="errors",
         column="friction_power_change"),
-    "seat_offset": _seat(JE, "m", "offset of the pin's axis from the hole's at each end, hole's axes", "seat"),
-    "end_force": _seat(JE, "N", "force of the pin on each end of its hole, hole's axes", "end_force"),
-    "contact_position": _seat(JE, "m", "place where the pin touches its hole at each end", "contact"),
-    "seat_beta": _seat(J, "rad", "angle β between the seats of a pin's ends", "seat_beta"),
-    "seat_xi": _seat(J, "rad", "direction ξ of a pin's seat in its hole", "seat_xi"),
-    "seat_xi_pin": _seat(J, "rad", "direction ξ of a pin's seat in the pin's own frame", "seat_xi_pin"),
-    "contact_lost": _seat(J, "1", "1 where the pin loses contact", "contact_lost", np.int8),
+    "seat_offset": _seat(JE, "m", "offset of the pin's axis from the hole's at each end, hole's axes", column="seat"),
+    "end_force": _seat(JE, "N", "force of the pin on each end of its hole, hole's axes", column="end_force"),
+    "contact_position": _seat(JE, "m", "place where the pin touches its hole at each end", column="contact"),
+    "seat_beta": _seat(J, "rad", "angle β between the seats of a pin's ends", column="seat_beta"),
+    "seat_xi": _seat(J, "rad", "direction ξ of a pin's seat in its hole", column="seat_xi"),
+    "seat_xi_pin": _seat(J, "rad", "direction ξ of a pin's seat in the pin's own frame", column="seat_xi_pin"),
+    "contact_lost": _seat(J, "1", "1 where the pin loses contact", np.int8, column="contact_lost"),
     "contact_loss_number": _rest(
         J, "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats",
         column="contact_loss_number"),

@@ -85,15 +85,16 @@ class Term:
     """A part of an expression, compiled.
 
     value: of the values of the names; dimension: from the dimensions of the names; operands: what it is made of;
-    parts: those below it; passes: how an angle that is wanted of it is wanted of these, by the dimensions of the names
-    (of a literal, a name, a product or a power it is not).
+    parts: those below it; takes, gives: as a function has them, of terms too (of a literal, a name, a product or a
+    power nothing).
     """
 
     value: Evaluator
     dimension: Callable[[Dimensions], Dimension | None]
     operands: tuple[Literal | str, ...]
     parts: tuple[Term, ...] = ()
-    passes: Callable[[Dimensions, bool], bool] | None = None
+    takes: str = ""
+    gives: str = ""
     function: str = ""
 
 
@@ -222,7 +223,7 @@ def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Term:
         case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):
             part, negative = _compile(inner, operands), isinstance(sign, ast.USub)
             value: Evaluator = (lambda names: -part.value(names)) if negative else part.value
-            return Term(value, part.dimension, part.operands, (part,), lambda names, angle: angle)
+            return Term(value, part.dimension, part.operands, (part,), "same", "same")
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _OPERATORS:
             return _binary(operator, _compile(left, operands), _compile(right, operands), _integer(right, operands))
         case ast.Call(func=ast.Name(id=key), args=arguments, keywords=[]):
@@ -285,7 +286,7 @@ def _binary(operator: ast.operator, first: Term, second: Term, exponent: int | N
         return _combine(NUMBER, base, Fraction(exponent))
 
     if isinstance(operator, ast.Add | ast.Sub):
-        return Term(value, terms, operands, parts, lambda names, angle: angle or terms(names) == ANGLE)
+        return Term(value, terms, operands, parts, "same", "same")
     if isinstance(operator, ast.Mult | ast.Div):
         return Term(value, product, operands, parts)
     if exponent is None:
@@ -320,13 +321,8 @@ def _call(name: Literal | str, arguments: tuple[Term, ...]) -> Term:
             return ANGLE if function.gives == "angle" else NUMBER
         return common if function.gives == "same" or common is None else _combine(NUMBER, common, Fraction(1, 2))
 
-    def passes(names: Dimensions, angle: bool) -> bool:
-        if function.takes == "same" and any(argument.dimension(names) == ANGLE for argument in arguments):
-            return True
-        return function.takes == "angle" or (angle and function.gives == "same")
-
     operands = (name, *(operand for argument in arguments for operand in argument.operands))
-    return Term(value, dimension, operands, arguments, passes, name)
+    return Term(value, dimension, operands, arguments, function.takes, function.gives, name)
 
 
 def _kinks(part: Term) -> Iterator[Evaluator]:
@@ -352,8 +348,9 @@ def unitless_angles(part: Term, names: Dimensions, plain: Collection[str], angle
     They stand for an angle where the whole is one, beside a term that is one, or in sin, cos and tan. angle: whether
     the part is wanted as one.
     """
-    if part.passes:
-        angle = part.passes(names, angle)
+    if part.takes:
+        beside = part.takes == "same" and any(below.dimension(names) == ANGLE for below in part.parts)
+        angle = part.takes == "angle" or beside or (angle and part.gives == "same")
     elif angle:
         dimensions = [operand for operand in part.operands if isinstance(operand, str)]  # functions and pi among them
         if not any(operand.unit for operand in part.operands if isinstance(operand, Literal)):

@@ -343,8 +343,8 @@ def test_doubts_are_kept_apart_from_errors(tmp_path):
     found = warned(text, tmp_path)
     assert found["dimensions.unused"] is Severity.NOTE
     text = VARIED.replace("t: 0.05 mm}", "t: 0.05 mm, idle: 1 mm}")
-    found = warned(text.replace("  AB: ±t", "  AB: {limits: ±t, shift: 0.1 mm}\n  idle: ±t"), tmp_path)
-    assert found["tolerances.idle"] == found["tolerances.AB.shift"] == Severity.WARNING
+    found = warned(text.replace("  AB: ±t", "  AB: ±t\n  idle: ±t"), tmp_path)
+    assert found["dimensions.idle"] is Severity.NOTE
     assert found["tolerances.BC"] is Severity.NOTE  # overrides what stands with the number
     assert not warned(RSSP, tmp_path)
     assert warned(RSSP.replace(", width: 40 mm", ""), tmp_path) == {

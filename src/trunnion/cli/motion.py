@@ -182,7 +182,7 @@ def simulate(
     from trunnion.dynamics.simulate import simulated
     from trunnion.dynamics.steady_cycle import UnsteadyError
 
-    duration = seconds(time, "--time", "2s")
+    duration = seconds(time, "--time")
     mechanism = model.read()
     contacts = bool(in_play(mechanism))  # else there are none to write or draw
     check_files(files, "cycle" if steady else "motion", kind if files.out else None, in_play=contacts)

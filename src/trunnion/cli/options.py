@@ -188,24 +188,18 @@ def _plain(text: str) -> float | str:
         return text.strip()
 
 
-def seconds(text: str | None, option: str, usual: str) -> float | None:
-    """A time above 0 in s, from a number or a text with its unit; None if it is not given.
-
-    usual: a time as one would give it, for the remedy. Raises MechanismError if the text is no such time.
-    """
+def seconds(text: str | None, option: str) -> float | None:
+    """A time above 0 in s, of a number or a text with its unit; None if it is not given. MechanismError for others."""
     from trunnion.model.quantity import Quantity
     from trunnion.model.units import KINDS, UnitError
 
     if text is None:
         return None
-    remedy = f"give a time such as {usual}"
-    try:
+    time = math.nan
+    with suppress(UnitError, KeyError):  # the latter of a dimension of the model, which is not asked here
         time = float(Quantity.read(_plain(text), KINDS["time"]).evaluate())
-    except (UnitError, KeyError) as error:  # a KeyError of a dimension of the model, which is not asked here
-        what = error.what if isinstance(error, UnitError) else f"'{text.strip()}' is no time"
-        raise MechanismError(Finding(what, option, getattr(error, "remedy", "") or remedy)) from None
     if not time > 0:
-        raise MechanismError(Finding(f"a time of {text.strip()} is not above 0", option, remedy))
+        raise MechanismError(Finding(f"'{text.strip()}' is no time above 0", option, "give a time such as 2s"))
     return time
 
 
@@ -217,15 +211,13 @@ def over(texts: list[str]) -> dict[str, Any]:
     for text in texts:
         name, values = named(text, "--over", what, remedy)
         parts = values.split(":")
-        if not all(part.strip() for part in parts) or len(parts) not in (1, 3):
+        counted = len(parts) == 3 and parts[2].strip().isdecimal()
+        if not all(part.strip() for part in parts) or not (counted or len(parts) == 1):
             raise MechanismError(Finding(f"'{text}' {what}", "--over", remedy))
         if name in grid:
             raise MechanismError(Finding(f"'{name}' is given twice", "--over", "give all its values at once"))
-        if len(parts) == 3 and not parts[2].strip().isdecimal():
-            what = f"the count '{parts[2].strip()}' is no whole number"
-            raise MechanismError(Finding(what, f"--over {name}", "write FROM:TO:COUNT, e.g. 0deg:30deg:7"))
-        ends = [_plain(part) for part in (parts[:2] if len(parts) == 3 else values.split(","))]
-        grid[name] = (*ends, int(parts[2])) if len(parts) == 3 else ends
+        ends = [_plain(part) for part in (parts[:2] if counted else values.split(","))]
+        grid[name] = (*ends, int(parts[2])) if counted else ends
     return grid
 
 

@@ -48,7 +48,6 @@ class Mechanism(Varying):
             super().__init__(**data)
         except ValidationError as error:
             raise MechanismError(schema_findings(error, Mechanism, data)) from None
-        self.__dict__["checked"] = check_model(self)
         if findings := [finding for finding in self.checked if finding.severity is Severity.ERROR]:
             raise MechanismError(findings)
 

@@ -49,7 +49,6 @@ def meant(mechanism: Varying, section: str, names: Iterable[str]) -> tuple[dict[
 def tolerance_names(mechanism: Varying) -> Iterator[Finding]:
     """Whether each name is of a number that can vary, once, and distributions and costs get what they take."""
     entries = {entry.path: entry for entry in mechanism.entries}
-    used = {name for entry in mechanism.entries for name in entry.quantity.names}
     followed = {entry.alias for entry in mechanism.entries}
     kinds = measured(mechanism, mechanism.entries)
     paths, findings = meant(mechanism, "tolerances", mechanism.variations)
@@ -71,8 +70,6 @@ def tolerance_names(mechanism: Varying) -> Iterator[Finding]:
              f"'{path}' is not a parameter of the mechanism"),
             (path.startswith(DEFAULTS) and path not in followed, "", f"no joint follows '{path}'"),
             (percent, "", f"the limits '{limits}' are in percent, the number is not"),
-            (path.startswith("dimensions.") and path.partition(".")[2] not in used, "",
-             f"no result depends on '{path}'", "use it, or remove it", Severity.WARNING),
         )  # fmt: skip
     for row, pair in enumerate(mechanism.correlations):
         yield from meant(mechanism, f"correlations.{row}", dict.fromkeys(pair.of))[1]
@@ -139,7 +136,7 @@ def _limits(mechanism: Varying, tolerance: Tolerance, variation: Variation, wher
     """Whether limits and what a distribution was told make one."""
     path, lower, upper, half = tolerance.path, tolerance.lower, tolerance.upper, tolerance.half_width
     entries, options = mechanism.parameter_set.entries, dict[str, Any](tolerance.options)
-    cp, cpk, mode, shift = options.get("cp", 1.0), options.get("cpk"), options.get("mode"), options.get("shift", 0.0)
+    cp, cpk, mode = options.get("cp", 1.0), options.get("cpk"), options.get("mode")
     kind, aimed = entries[path].kind, bool(towards(path, entries))
     cpk_at = "tolerances" if variation.cpk is not None else "tolerance_defaults.cpk"
     yield from faults(
@@ -160,9 +157,6 @@ def _limits(mechanism: Varying, tolerance: Tolerance, variation: Variation, wher
          f"'{path}' is no angle", "only an angle is uniform over all directions"),
         (mode is not None and not lower <= mode <= upper, "mode",
          f"the mode {mode or 0:g} is outside the limits {lower:g} to {upper:g} (SI)"),
-        (abs(shift) > half, "shift",
-         f"the shift {shift:g} puts the mean outside the limits, {half:g} from their middle (SI)", "check its unit",
-         Severity.WARNING),
     )  # fmt: skip
     if cpk is not None and cpk > cp * (1 + ROUNDING):
         what = f"cpk {cpk:g} is above cp {cp:g}: the share of the limits cannot be larger off the middle than in it"

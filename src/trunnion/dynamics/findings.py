@@ -14,7 +14,7 @@ from trunnion.dynamics.opened import in_play, of_several
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.solution import Ended, Solution
 from trunnion.dynamics.state import FreeMotion
-from trunnion.errors import Finding, MechanismError, Status, agreeing, counted
+from trunnion.errors import Finding, MechanismError, Status, counted
 from trunnion.joints.contact import restitution_of
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.mechanism import Mechanism
@@ -180,12 +180,10 @@ def motion_findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterato
     if locks := [event for event in solution.events if event.kind == "lock"]:
         joints, times = list(dict.fromkeys(event.of for event in locks)), len({event.time for event in locks})
         energy = float(np.nansum([event.figure for event in locks]))
-        what = f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
-        what += f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
-        what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, and {readable(energy, 'J')} is lost"
-        remedy = "see `trunnion locking` for where and by how much"
+        what = f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}, friction locks {', '.join(joints)} "
+        what += f"as the mechanism runs, which stops at once, and {readable(energy, 'J')} is lost"
+        where, remedy = f"{'joints' if motion.several else 'drivers'}.{joints[0]}", "see `trunnion locking` for where"
         figures = {"joints": joints, "times": times, "time": locks[0].time, "energy": energy}
-        where = f"{'joints' if motion.several else 'drivers'}.{joints[0]}"
         yield Finding.warning("simulate.locks", where, what, remedy, **figures)
     name = next(iter(stated_drivers(motion, run)), next(iter(motion.system.mechanism.drivers)))
     if solution.stretches and solution.stretches[-1].resting:
@@ -256,7 +254,6 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
     """What holds it where it rests at the end."""
     last, rests = solution.stretches[-1], [event.time for event in solution.events if event.kind == "rest"]
     at = last.at(solution.layout, np.array([last.begin]))
-    turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
     figures: dict[str, Any]
     if motion.several:
         shares = np.abs(np.asarray(motion.accelerate(at).shares)[:, 0])
@@ -268,10 +265,18 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
         effort = effort_units(motion.system)[list(motion.system.mechanism.drivers).index(name)]
         acting, (forward, backward) = float(motion.given(at, 0.0 * at.q, {})[0, 0]), motion.excess(at)[:, 0]
         needed = acting - forward if acting > 0 or (acting == 0 and forward >= backward) else acting + backward
+        turns, place = motion.system.turns(motion.names[0]), float(at.q[0, 0])
         place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
         where, subject, at_place = f"drivers.{name}", name, f", at {readable(place, unit)}"
         acts = f"{readable(acting, effort)} act on it, and it breaks away from {readable(needed, effort)} on"
-        figures = {"driver": name, "given": acting, "needed": needed, "unit": effort}
+        figures = {
+            "driver": name,
+            "given": acting,
+            "needed": needed,
+            "unit": effort,
+            "coordinate": place,
+            "place": unit,
+        }
     since, final = readable(rests[-1], "s"), last.at(solution.layout, np.array([solution.end]))
     on = [
         driver
@@ -283,12 +288,9 @@ def _rests(motion: FreeMotion, solution: Solution, name: str) -> Iterator[Findin
         remedy = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
         yield Finding.warning("simulate.stays_at_rest", where, f"{subject} does not start: {acts}", remedy, **figures)
     elif on:
-        figures |= {"time": rests[-1], "drivers": on} if motion.several else {
-            "time": rests[-1], "coordinate": place, "place": "rad" if turns else "m"
-        }  # fmt: skip
         what = f"{subject} stalls at {since}{at_place}, with the motor of {', '.join(on)} on: {acts}"
         remedy = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
-        yield Finding.error("simulate.stalls", where, what, remedy, **figures)
+        yield Finding.error("simulate.stalls", where, what, remedy, **figures, time=rests[-1], drivers=on)
     else:
         what = f"{subject} comes to rest {counted(len(rests), 'time')}, for the last time at {since}: {acts}"
         yield Finding.note("simulate.rests", where, what, **figures, time=rests[-1], times=len(rests))

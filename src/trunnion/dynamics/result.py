@@ -27,8 +27,8 @@ from trunnion.dynamics.findings import motion_findings, stated_drivers, undefine
 from trunnion.dynamics.measured import steady_figures
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import Opened, in_play
-from trunnion.dynamics.rates import CLUTCH, WORKS, kinetic_energy, potential_energy
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
+from trunnion.dynamics.rates import kinetic_energy, potential_energy
 from trunnion.dynamics.solution import Event, Impact, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contact, ContactState, Push, pushes_of
@@ -53,9 +53,9 @@ MOTION: dict[str, Variable] = {
     "drive_rate": Variable(("driver", "time"), "rate", "rate of the driver's coordinate"),
     "work_drive": Variable(("time",), "J", "work of the drivers since the start"),
     "work_loads": Variable(("time",), "J", "work of the loads since the start, positive into the mechanism"),
-    "work_springs": Variable(("time",), "J", "work of springs and dampers since the start, likewise"),
+    "work_springs": Variable(("time",), "J", "work of the springs since the start, likewise, and of dampers"),
     "work_friction": Variable(("time",), "J", "work lost to friction since the start"),
-    "work_clutch": Variable(("time",), "J", "work lost in the clutch of a motor since the start"),
+    "work_clutch": Variable(("time",), "J", "work lost in the clutch since the start"),
     "rotor_speed": Variable(("driver", "time"), "rate", "speed of the motor's rotor behind its clutch"),
     "kinetic_energy": Variable(("time",), "J", "kinetic energy of the links"),
     "potential_energy": Variable(("time",), "J", "potential energy of the links in the field of gravity"),
@@ -65,11 +65,6 @@ MOTION: dict[str, Variable] = {
     "event_time": Variable(("event",), "s", "time of the event"),
 }
 
-
-WORDS = dict(zip((*WORKS, IN_CONTACTS, CLUTCH), (
-    "work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
-    "work lost in contacts", "work lost in the clutch",
-), strict=True))  # fmt: skip
 CONTACT: dict[str, Variable] = {
     "contact_gap": Variable(("contact", "time"), "m", "gap of the contact, negative where it touches"),
     "contact_normal_force": Variable(("contact", "time"), "N", "normal force of the contact"),
@@ -80,7 +75,7 @@ CONTACT: dict[str, Variable] = {
         ("contact", "axis", "time"), "m", "offset of the pin in its hole, of a corner in its guide; in the hole's axes"
     ),
     "contact_energy": Variable(("time",), "J", "elastic energy in the contacts"),
-    "work_contact": Variable(("time",), "J", "work lost in the contacts since the start, friction in them included"),
+    "work_contact": Variable(("time",), "J", "work lost in contacts since the start, friction in them included"),
 }
 IMPACT: dict[str, Variable] = {
     "impact_begin": Variable(("impact",), "s", "time at which a contact begins"),
@@ -483,7 +478,8 @@ def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) ->
         yield from _impact_figures(contact.label, of_contact, solution.end)
     for key, work in zip(solution.layout.works_named, course.last.works, strict=True):
         if abs(work[0]) > scales.floor("J"):
-            yield Figure(f"work_{key}", WORDS[key], float(work[0]), "J")
+            subject, _, _ = (MOTION | CONTACT)[f"work_{key}"].long_name.partition(" since")
+            yield Figure(f"work_{key}", subject, float(work[0]), "J")
     yield Figure("energy_residual", "largest error of the energy account", course.worst, "J")
 
 

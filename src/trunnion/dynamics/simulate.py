@@ -231,8 +231,7 @@ class Continued:
             self.time, self._row = integration.last
             self._mode, self._snapshot = integration.mode, integration.snapshot
             return filled(self.motion, solution, np.array([self.time]))
-        findings = motion_findings(self.motion, solution, self.run)
-        self.ended = next(finding for finding in findings if finding.code == solution.ended.code)
+        *_, self.ended = motion_findings(self.motion, solution, self.run)  # why it ends is the last
         self.time = solution.end if solution.stretches else self.time
         self._end = filled(self.motion, solution, np.array([self.time]))
         return self._end

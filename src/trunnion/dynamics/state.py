@@ -322,7 +322,7 @@ class FreeMotion:
             for k, sense in enumerate((1, -1)):
                 begins = at._replace(senses=(sense,))
                 senses = self.senses(begins, pattern)
-                demanded = self.demanded(self.solve(begins, zero, senses), at.q.shape)[0]
+                demanded = np.asarray(primal(self.solve(begins, zero, senses).efforts[self.names[0]]), float)
                 miss = sense * (self.given(begins, zero, senses)[0] - demanded)
                 excess[k] = np.where(np.isfinite(demanded), miss, -np.inf)
         return excess
@@ -360,11 +360,6 @@ class FreeMotion:
     def given(self, at: Moment, second: Array, senses: Mapping[str, Sense]) -> Array:
         """The same of many lanes, (coordinate, lane)."""
         return np.array(self.driven(at, second, senses)).reshape(at.q.shape)
-
-    def demanded(self, back: Backward, shape: tuple[int, ...]) -> Array:
-        """Efforts that a walk demands of the free drivers, (coordinate, lane)."""
-        demands = [np.broadcast_to(primal(back.efforts[name]), shape[1:]) for name in self.names]
-        return np.array(demands, float).reshape(shape)
 
     def accelerate(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
         """The accelerations at which every free driver is given what the walk demands, with what holds the rows that

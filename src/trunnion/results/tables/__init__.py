@@ -69,8 +69,7 @@ def check_table(path: str | os.PathLike[str], kind: str, in_play: bool = True) -
         return inner
     if inner in others or len(tables) > 1:
         named = f" or x.TABLE{suffix}, TABLE: {', '.join(tables)}" if len(tables) > 1 else ""
-        why = ": no joint is in play" if inner in KINDS[kind] else " of a cycle" if kind == "cycle" else ""
-        raise MechanismError(Finding(f"there is no table '{inner}'{why}", str(path), f"use x{suffix}{named}"))
+        raise MechanismError(Finding(f"there is no table '{inner}'", str(path), f"use x{suffix}{named}"))
     return inner
 
 

@@ -47,8 +47,8 @@ class Line(NamedTuple):
     """A curve or, without a dash, points.
 
     low, high: lengths of the bars of their uncertainty; steps: constant up to the next point; close: over a whole turn
-    led on to its first value, of what may gain whole turns to that and as many of `turn` as it has gained; shares:
-    places of its points on the scale of colours, from 0 to 1; arrow: with a head at its end.
+    led on to its first value, of what may gain whole turns to that and as many of `turn` as it has gained; arrow: with
+    a head at its end.
     """
 
     x: Array
@@ -60,7 +60,6 @@ class Line(NamedTuple):
     steps: bool = False
     close: bool = False
     turn: float = 0.0
-    shares: Array | None = None
     arrow: bool = False
 
     def times(self, factor: float) -> Line:
@@ -123,7 +122,7 @@ class Ring(NamedTuple):
 class Note(NamedTuple):
     """A text at a place in shares of the frame or, data, in the units of the axes; shift: from there, in points.
 
-    beside: it is put where it hides nothing, as near to its place as there is room.
+    outwards: beside its place, on the side away from the origin.
     """
 
     text: str
@@ -136,7 +135,7 @@ class Note(NamedTuple):
     size: float = 8.0
     shift: tuple[float, float] = (0.0, 0.0)
     boxed: bool = False
-    beside: bool = False
+    outwards: bool = False
 
 
 class ColourScale(NamedTuple):

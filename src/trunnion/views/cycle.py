@@ -180,7 +180,7 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             marks.append(track(vectors[0], factor, Look(index)))
             marks.append(Line(dots[0], dots[1], None, Look(index, dash="none", mark="o", size=3.2, order=4.0)))
             marks += [
-                Note(over.say(place), x, y, data=True, size=7.5, colour="ink", beside=True)
+                Note(over.say(place), x, y, data=True, size=7.5, colour="ink", outwards=True)
                 for place, (x, y) in zip(at[::3], dots[:, ::3].T.tolist(), strict=True)
                 if np.isfinite(x + y)
             ]
@@ -302,23 +302,18 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], result: xr.Dataset) ->
     over, (factor, unit) = abscissa(result), prefixed(seats.clearance, "m")
     rho, offset = seats.clearance * factor, seats.offsets[end, list(plane)] * factor
     force, square, most = seats.forces[end, list(plane)], seats.kind == "guide", seats.peak
-    shares = (over.values - float(over.values.min())) / (over.span or 1.0)  # places on the scale of colours
     marks: list[Mark] = [Ring((0.0, 0.0), size * rho, look, square, filled) for size, look, filled in (
         (1 + PIN + WALL, Look("shade", 0.0, order=0.7), 1.0), (1 + PIN, Look("ink", 1.4, order=0.8), 0.0),
         (1.0, Look("muted", 0.8, "dashed", order=2.0), 0.0))]  # fmt: skip
-    x, hues = (np.hstack([offset, offset[:, :1]]), np.append(shares, shares[0])) if over.closed else (offset, shares)
-    cuts = np.flatnonzero(~(np.linalg.norm(np.diff(x, axis=1), axis=0) < rho)) + 1  # where the pin jumps
-    for part, hue in zip(np.split(x, cuts, axis=1), np.split(hues, cuts), strict=True):
-        if part.shape[1] > 1:
-            marks.append(Line(part[0], part[1], None, Look(0, 2.6, order=3.0), shares=hue))
-        elif np.isfinite(part).all():
-            marks.append(Line(part[0], part[1], None, Look(float(hue[0]), dash="none", mark="o", size=3.7, order=3.0)))
+    x = np.hstack([offset, offset[:, :1]]) if over.closed else offset
+    jumps = np.flatnonzero(~(np.linalg.norm(np.diff(x, axis=1), axis=0) < rho)) + 1
+    marks.append(Line(*np.insert(x, jumps, np.nan, axis=1), None, Look("ink", 2.0, order=3.0)))
     picked = [0, over.values.size // 2, over.values.size - 1]  # positions that are named
     if over.closed:
         angles = over.values[0] + over.period * np.arange(4) / 4
         picked = [int(np.argmin(np.abs(over.values - angle))) for angle in angles]
-    for index in (index for index in dict.fromkeys(picked) if np.isfinite(offset[:, index]).all()):
-        paint, place = Look(float(shares[index])), offset[:, index]
+    for k, index in enumerate(index for index in dict.fromkeys(picked) if np.isfinite(offset[:, index]).all()):
+        paint, place = Look(k), offset[:, index]
         at, size = (float(place[0]), float(place[1])), float(np.hypot(*place))
         marks.append(Ring(at, PIN * rho, paint.but(width=1.1, alpha=0.85, order=1.5), square, 0.07))
         marks.append(Line(place[:1], place[1:], None, paint.but(dash="none", mark="o", size=5.5, order=5.0)))
@@ -327,7 +322,7 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], result: xr.Dataset) ->
             tip = start + force[:, index] / most * ARROW * rho
             path = np.stack([start, tip], axis=1)
             marks.append(Line(path[0], path[1], None, paint.but(width=1.5, order=6.0), arrow=True))
-            marks.append(Note(over.say(index), tip[0], tip[1], data=True, size=7.5, beside=True))
+            marks.append(Note(over.say(index), tip[0], tip[1], data=True, size=7.5, outwards=True))
     slack = seats.offsets[end, 2] * factor if seats.along > 0 else np.empty(0)
     if np.isfinite(slack).any():
         text = f"along the axis {number(float(np.nanmin(slack)), 3)} to {number(float(np.nanmax(slack)), 3)} {unit}"

@@ -9,7 +9,7 @@ import io
 import os
 import re
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib import colormaps, patches, rc_context, ticker
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
-    from matplotlib.text import Annotation
 
 INK, MUTED, RULE, SHADE, LIMIT, PALE = "#1b1f24", "#5d6670", "#d9dde2", "#eceef1", "#a1260d", "#b9c3cd"
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": LIMIT, "pale": PALE}
@@ -109,7 +108,6 @@ def figure(result: xr.Dataset, plot: Plot) -> Figure:
     heights = [max(panel.height for panel in row) for row in rows]
     above = 0.55 + 0.2 * plot.title.count("\n")
     sheet = new(plot.title, result, above + sum(heights), plot.width or PAGE.get(columns, PAGE[3]))
-    labels = Labels(sheet)
     if plot.shared:
         _shared(sheet, plot, columns)
     else:
@@ -123,11 +121,10 @@ def figure(result: xr.Dataset, plot: Plot) -> Figure:
             ratios = list(panel.parts) or [1.0] * len(panel.charts)
             stacked = part.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
             for axes, spec in zip(stacked, panel.charts, strict=True):
-                _chart(axes, spec, labels, wide)
+                _chart(axes, spec, wide)
                 if axes is not stacked[-1]:
                     axes.set_xlabel("")
                     axes.tick_params(labelbottom=False)
-    labels.place()
     if plot.note:
         sheet.text(0.012, 0.005, plain(plot.note), fontsize=7.5, color=MUTED)
     return sheet
@@ -139,7 +136,7 @@ def _shared(sheet: Figure, plot: Plot, columns: int) -> None:
     places = sheet.subplots(-(-len(specs) // columns), columns, sharex=True, sharey=True, squeeze=False).ravel()
     named: dict[str, Any] = {}
     for k, (axes, spec) in enumerate(zip(places, specs, strict=False)):
-        _chart(axes, spec if len(specs) == 1 else replace(spec, legend=None), Labels(sheet))
+        _chart(axes, spec if len(specs) == 1 else replace(spec, legend=None))
         lowest, leftmost = k + columns >= len(specs), k % columns == 0
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)
         axes.set_xlabel(axes.get_xlabel() if lowest else "")
@@ -162,7 +159,7 @@ def _shared(sheet: Figure, plot: Plot, columns: int) -> None:
 # ---- a chart ------------------------------------------------------------------------------------------------------
 
 
-def _chart(axes: Axes, spec: Chart, labels: Labels, wide: float = 1.0) -> None:
+def _chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
     """A chart on axes; wide: of the width of all figures, which its legend has room in."""
     axes.set_axisbelow(True)  # quiet: a light grid below the curves, a frame left and below only
     axes.grid(True, color=RULE, linewidth=0.6)
@@ -182,9 +179,7 @@ def _chart(axes: Axes, spec: Chart, labels: Labels, wide: float = 1.0) -> None:
         axes.set_aspect("equal", adjustable="box" if spec.y.limits[0] is not None else "datalim")
     _axis(axes, "y", spec.y)
     for mark in spec.marks:
-        if isinstance(mark, Note) and mark.beside:
-            labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
-        elif not isinstance(mark, Rule):
+        if not isinstance(mark, Rule):
             _mark(mark, axes, spec)
     _limits(axes, spec)
     for mark in (mark for mark in spec.marks if isinstance(mark, Rule)):
@@ -307,12 +302,6 @@ def _line(mark: Line, axes: Axes, spec: Chart, label: str | None) -> None:
                  "mutation_scale": 9}  # fmt: skip
         axes.annotate("", xy=(x[-1], y[-1]), xytext=(x[0], y[0]), arrowprops=arrow, zorder=mark.look.order)
         return
-    if mark.shares is not None:
-        pieces = np.stack([np.stack([x[:-1], y[:-1]], 1), np.stack([x[1:], y[1:]], 1)], 1)
-        paints = RISING((mark.shares[:-1] + mark.shares[1:]) / 2)
-        axes.add_collection(LineCollection(list(pieces), colors=paints, linewidths=mark.look.width,
-                                           zorder=mark.look.order))  # fmt: skip
-        return
     axes.plot(x, y, label=label, solid_joinstyle="round", drawstyle="steps-post" if mark.steps else "default", **style)
     finite = np.isfinite(y)
     alone = finite & ~np.append(False, finite[:-1]) & ~np.append(finite[1:], False)
@@ -322,7 +311,7 @@ def _line(mark: Line, axes: Axes, spec: Chart, label: str | None) -> None:
 
 
 def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
-    """A mark of any kind but a rule, and a note that is placed at the end."""
+    """A mark of any kind but a rule."""
     name = getattr(mark, "name", None)
     label = None if name is None else plain(name)
     match mark:
@@ -347,6 +336,8 @@ def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
             }  # fmt: skip
             square = patches.Rectangle((x0 - r, y0 - r), 2 * r, 2 * r, **shape)
             axes.add_patch(square if mark.square else patches.Circle((x0, y0), r, **shape))
+        case Note(text, x0, y0) if mark.outwards:
+            name_beside(axes, text, np.array([x0, y0]), np.array([x0, y0]), mark.size, weight="normal")
         case Note(text, x0, y0):
             box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
             axes.annotate(
@@ -388,73 +379,29 @@ def _contours(mark: Contours, axes: Axes) -> None:
 
 # ---- names in a drawing --------------------------------------------------------------------------------------------
 
-SIDES = np.array([[np.cos(angle), np.sin(angle)] for angle in np.radians(np.arange(0, 360, 15))])
-GAPS = (5.0, 8.0, 12.0, 18.0, 26.0)  # points from the place to the name
-FURTHER = 0.07  # what a gap more costs, beside the share of the name's box that is not empty
-DARK = 3.0  # pale bodies count almost as much as lines
-LEAST, EMPTY = 6.0, 1.5  # points around every place that are its joint's, however pale its symbol is; around a name
-CROSSED, CUT = 5.0, 100.0  # costs of lying on another name, outside the frame
+OFFSET = 7.0  # points from a place to its name
+ASLANT = 0.4  # of a direction: below it a name stands centred
 
 
-@dataclass
-class Labels:
-    """The names of one figure: added while it is drawn, placed when all else is there.
+def name_beside(
+    axes: Axes, text: str, place: Array, away: Array, size: float = 10.0, symbol: float = 0.0, weight: str = "bold"
+) -> None:
+    """A name at a fixed distance from a place, in the direction `away` from all else.
 
-    The figure is painted once without names; what is dark there is in the way. So a name keeps off links, springs,
-    ground, arrows, curves and titles alike, whatever draws them.
+    symbol: half width of what is drawn there, in the coordinates of the axes; size: of the letters, points.
     """
-
-    figure: Figure
-    waiting: list[tuple[Annotation, float]] = field(default_factory=list)
-
-    def add(
-        self, axes: Axes, text: str, place: Array, size: float = 10.0, symbol: float = 0.0, weight: str = "bold"
-    ) -> None:
-        """A name of a place in the coordinates of the axes. size: of its letters, points; symbol: half width of what is
-        drawn there, in the same coordinates."""
-        if not np.all(np.isfinite(place)):
-            return
-        note = axes.annotate(
-            plain(text), (place[0], place[1]), xytext=(0, 0), textcoords="offset points", ha="center", va="center",
-            fontsize=size, fontweight=weight, color=INK, zorder=8, annotation_clip=False, visible=False,
-            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
-        )  # fmt: skip
-        note.set_in_layout(False)  # which it would change
-        self.waiting.append((note, symbol))
-
-    def place(self) -> None:
-        """Move every name to where, within its axes, it covers least of what is drawn and of the names before it."""
-        if not self.waiting:
-            return
-        canvas, scale, spots = FigureCanvasAgg(self.figure), self.figure.dpi / 72, list[Array]()
-        canvas.draw()  # type: ignore[no-untyped-call]
-        pixels = np.asarray(canvas.buffer_rgba())[::-1, :, :3]  # type: ignore[no-untyped-call]  # rows from below
-        dark = np.clip(DARK * (1 - pixels.min(axis=2) / 255), 0, 1)
-
-        def box(middle: Array, half: Array | float) -> tuple[slice, slice]:
-            left, below, right, above = np.maximum(np.rint([*(middle - half), *(middle + half)]).astype(int), 0)
-            return slice(below, above + 1), slice(left, right + 1)
-
-        for note, symbol in self.waiting:
-            ends = note.axes.transData.transform(np.add([note.xy] * 2, [(0.0, 0.0), (symbol, 0.0)]))  # type: ignore[union-attr]
-            spots.append(ends[0])
-            dark[box(ends[0], max(LEAST * scale, float(ends[1, 0] - ends[0, 0])))] = 1.0
-        for (note, _), spot in zip(self.waiting, spots, strict=True):
-            note.set_visible(True)
-            extent, frame = note.get_window_extent(), note.axes.bbox  # type: ignore[union-attr]
-            half, costs = (
-                0.5 * np.array([extent.width, extent.height]) + EMPTY * scale,
-                dict[tuple[float, float], float](),
-            )
-            for far, gap in enumerate(GAPS):
-                for side in SIDES:
-                    x, y = spot + gap * scale * side + half * side / np.abs(side).max()
-                    within = frame.contains(x - half[0], y - half[1]) and frame.contains(x + half[0], y + half[1])
-                    covered = dark[box(np.array([x, y]), half)]
-                    costs[x, y] = (float(covered.mean()) if covered.size else 1.0) + FURTHER * far + CUT * (not within)
-            best = np.array(min(costs, key=costs.__getitem__))
-            note.set_position(tuple((best - spot) / scale))
-            dark[box(best, half)] = CROSSED
+    if not np.all(np.isfinite(place)):
+        return
+    x, y = np.asarray(away) / (np.hypot(*away) or 1.0)
+    across: Any = "left" if x > ASLANT else "right" if x < -ASLANT else "center"
+    up: Any = "bottom" if y > ASLANT else "top" if y < -ASLANT else "center"
+    note = axes.annotate(
+        plain(text), (place[0] + symbol * x, place[1] + symbol * y), xytext=(OFFSET * x, OFFSET * y),
+        textcoords="offset points", ha=across, va=up, fontsize=size, fontweight=weight, color=INK, zorder=8,
+        annotation_clip=False, bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none",
+                                     "alpha": 0.75},
+    )  # fmt: skip
+    note.set_in_layout(False)  # which it would change
 
 
 # ---- files --------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from trunnion.views import sketch
 from trunnion.views.assembly import some
 from trunnion.views.axis import Array
 from trunnion.views.bodies import Scenery, scenery, space
-from trunnion.views.draw import INK, MUTED, RULE, Labels, new, plain
+from trunnion.views.draw import INK, MUTED, RULE, new, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,7 +64,6 @@ def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Fi
     result = analyse(mechanism.with_friction("off"), 1)
     figure = new("Assembly modes", result, 0.6 + sum(heights), max(columns, 2) * width + 0.2)
     strips = figure.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
-    labels = Labels(figure)
     for strip, choice, row in zip(strips, groups, rows, strict=True):
         where = f", at {choice.where}" if choice.where else ""
         more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
@@ -75,8 +74,7 @@ def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Fi
             axes.set_visible(False)
         for axes, cell in zip(grid, row, strict=False):
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[], aspect="equal")
-            _draw(axes, choice, cell, SYMBOLS * float(np.hypot(across, up)), labels)
-    labels.place()
+            _draw(axes, choice, cell, SYMBOLS * float(np.hypot(across, up)))
     return figure
 
 
@@ -103,7 +101,7 @@ def _drawing(result: xr.Dataset, choice: GroupModes, camera: Array | None) -> tu
     return drawing, int(usable[np.argmin(np.abs(result["time"].values[usable] - choice.time))])
 
 
-def _draw(axes: Axes, choice: GroupModes, cell: Cell, size: float, labels: Labels) -> None:
+def _draw(axes: Axes, choice: GroupModes, cell: Cell, size: float) -> None:
     """The whole mechanism, as far as it is assembled, with the names of the joints of the group; size: of symbols."""
     mode, drawing, index = cell
     used, remark = mode.taken, ""  # the frame of the one that is taken is bold
@@ -114,11 +112,11 @@ def _draw(axes: Axes, choice: GroupModes, cell: Cell, size: float, labels: Label
         remark = "cannot be assembled in this mode"
     elif isinstance(drawing, Scenery):
         sketch.paint(axes, drawing, index, choice.links)
-        sketch.name_joints(axes, drawing, index, labels, tuple(mode.joints), 7.5)
+        sketch.name_joints(axes, drawing, index, tuple(mode.joints), 7.5)
     else:
         symbols, none = replace(drawing, size=size), np.zeros(index + 1)
         sketch.sketch(axes, symbols, index)
-        sketch.name_points(axes, symbols, index, labels, list(mode.joints))
+        sketch.name_points(axes, symbols, index, list(mode.joints))
         missing = [link for link in drawing.moving if not np.isfinite(drawing.angles.get(link, none)[index])]
         remark = f"not assembled here: {', '.join(missing)}" if missing else ""
     axes.text(0.03, 0.03, plain(remark), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)

@@ -27,7 +27,7 @@ from trunnion.results.quantities import prefixed
 from trunnion.views.axis import Array, Drawn, abscissa, is_spatial, layout, members, status_text
 from trunnion.views.bodies import HALF, Scenery, Solid, Space, scenery, space
 from trunnion.views.curves import ease, usual_peak
-from trunnion.views.draw import INK, MUTED, PALETTE, Labels, new, plain
+from trunnion.views.draw import INK, MUTED, PALETTE, name_beside, new, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,10 +117,8 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
             if (corners := _corners(drawing, link, other)) is not None:
                 closed = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
                 axes.plot(*closed.T, color=MUTED, linewidth=0.6, alpha=0.35, zorder=2, solid_joinstyle="round")
-    labels = Labels(figure)
     sketch(axes, drawing, index)
-    name_points(axes, drawing, index, labels)
-    labels.place()
+    name_points(axes, drawing, index)
     return figure
 
 
@@ -295,8 +293,11 @@ def cylinder(drawing: Picture, name: str) -> tuple[list[str], float, float] | No
     return (eyes, barrel, rod) if barrel < low and width < ASIDE * drawing.size else None
 
 
-def name_points(axes: Axes, drawing: Picture, index: int, labels: Labels, only: Sequence[str] | None = None) -> None:
-    """Names of joints and points, all or only some, those on one spot as one; points that are no joints get a dot."""
+def name_points(axes: Axes, drawing: Picture, index: int, only: Sequence[str] | None = None) -> None:
+    """Names of joints and points, all or only some, those on one spot as one; points that are no joints get a dot.
+
+    A name stands on the side away from the middle of all points, beside the foot of a fixed bearing.
+    """
     places, joints = dict[str, Array](), drawing.stated["joints"]
     for key, track in drawing.tracks.items():
         link, point = key.split(".", 1)
@@ -304,7 +305,7 @@ def name_points(axes: Axes, drawing: Picture, index: int, labels: Labels, only: 
             places[point] = track[:, index]
             if point not in joints and link != drawing.ground:
                 axes.plot(*track[:, index], "o", markersize=4.5 * drawing.weight, color=INK, zorder=6)
-    groups: list[list[str]] = []
+    middle, groups = np.mean(list(places.values()) or np.zeros((1, 2)), axis=0), list[list[str]]()
     for point, place in places.items() if only is None else ((name, places[name]) for name in places if name in only):
         near = (group for group in groups if np.hypot(*(places[group[0]] - place)) < 0.02 * drawing.size)
         home = next(near, None)
@@ -312,9 +313,14 @@ def name_points(axes: Axes, drawing: Picture, index: int, labels: Labels, only: 
             groups.append(home := [])
         home.append(point)
     for group in groups:
-        block = any(joints.get(point, {}).get("type") in GUIDED for point in group)
-        labels.add(axes, ", ".join(map(short, group)), places[group[0]], 10 * max(drawing.weight, 0.75),
-                   0.036 * drawing.size if block else 0.0)  # fmt: skip
+        place, about = places[group[0]], [joints[point] for point in group if point in joints]
+        block = any(joint["type"] in GUIDED for joint in about)
+        fixed = any(drawing.ground in joint["links"] for joint in about)
+        away = place - middle
+        if fixed and not block:
+            away = np.array([np.copysign(1.0, away[0]), 0.0])
+        name_beside(axes, ", ".join(map(short, group)), place, away, 10 * max(drawing.weight, 0.75),
+                    0.036 * drawing.size if block else 0.0)  # fmt: skip
 
 
 def short(name: str) -> str:
@@ -361,10 +367,8 @@ def _in_space(result: xr.Dataset, index: int | None) -> Figure:
     paint(axes, look, index)
     for start, end in arrows:
         _arrow(axes, start, end, REACTION)
-    labels = Labels(figure)
-    name_joints(axes, look, index, labels)
+    name_joints(axes, look, index)
     _key(axes, look, most)
-    labels.place()
     return figure
 
 
@@ -504,17 +508,17 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
     axes.text(left, y, text, ha="left", **letters)  # type: ignore[arg-type]
 
 
-def name_joints(
-    axes: Axes, look: Scenery, index: int, labels: Labels, only: tuple[str, ...] = (), size: float = 9.5
-) -> None:
+def name_joints(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), size: float = 9.5) -> None:
     """Names of joints and free points, all or only some."""
     bodies, camera = look.shown, look.camera
     spots = {name: (bodies.seated(name)[:, index] @ camera)[:2] for name in bodies.joints}
     dots = {key.split(".", 1)[1]: (bodies.track(key)[:, index] @ camera)[:2] for key in bodies.free
             if not key.startswith(f"{bodies.ground}.")}  # fmt: skip
-    for name, spot in (spots | dots).items():
+    spots |= dots
+    middle = np.nanmean(list(spots.values()), axis=0)
+    for name, spot in spots.items():
         if not only or name in only:
-            labels.add(axes, short(name), spot, size, 0.022 * bodies.size)
+            name_beside(axes, short(name), spot, spot - middle, size, 0.04 * bodies.size)
 
 
 # ---- solids as facets -----------------------------------------------------------------------------------------------

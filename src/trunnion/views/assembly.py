@@ -9,7 +9,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.results.attributes import summary_of
 from trunnion.results.quantities import parts, prefixed, quantity
@@ -28,7 +27,6 @@ FITS = 0  # code of the status of a position that goes together
 LEAST = 0.01  # of the need: a joint whose part is nowhere larger has no curve
 MOST_JOINTS = 8  # named in a line
 MOST_WAYS = 24  # in lines
-EQUAL = 1e-7  # of the largest number: nearer ones are one
 
 
 # ---- clearance ------------------------------------------------------------------------------------------------------
@@ -112,36 +110,16 @@ def some(choice: GroupModes, most: int) -> list[AssemblyMode]:
 
 
 def places(choice: GroupModes, assembly_mode: AssemblyMode) -> str:
-    """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'.
-
-    With as many digits as tell the ways apart: stated as a hint, it selects this one.
-    """
-    rows = np.array([[n for joint in mode.joints.values() for n in joint] for mode in choice.ways])
-    angles = np.degrees([list(mode.turns.values()) for mode in choice.ways])
-    digits = max(5, 3 + _decimals(angles))
-    turned = ", ".join(f"{name} {round(math.degrees(angle), 6):.{digits}g}°"
+    """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'; stated as a hint, it selects this."""
+    sizes = [abs(n) for mode in choice.ways for joint in mode.joints.values() for n in joint if math.isfinite(n)]
+    turned = ", ".join(f"{name} {round(math.degrees(angle), 6) + 0.0:.6g}°"
                        for name, angle in list(assembly_mode.turns.items())[:MOST_JOINTS])  # fmt: skip
-    largest = float(np.max(np.abs(rows), where=np.isfinite(rows), initial=0.0))
-    if not largest:
-        return turned or ("at the origin" if rows.size else "")
-    factor, unit = prefixed(largest, "m")
-    decimals = max(0, 3 - math.floor(math.log10(largest * factor)), _decimals(rows * factor))
-
-    def text(value: float) -> str:
-        number = f"{value * factor:.{decimals}f}"
-        number = number.rstrip("0").rstrip(".") if decimals else number
-        return "0" if number == "-0" else number
-
-    placed = [
-        f"{name} ({', '.join(map(text, joint))})" if len(joint) > 1 else f"{name} at {text(joint[0])}"
-        for name, joint in list(assembly_mode.joints.items())[:MOST_JOINTS]
-    ]
+    if not max(sizes, default=0.0):
+        return turned or ("at the origin" if sizes else "")
+    factor, unit = prefixed(max(sizes), "m")
+    placed = []
+    for name, joint in list(assembly_mode.joints.items())[:MOST_JOINTS]:
+        texts = [f"{round(value * factor, 6) + 0.0:.6g}" for value in joint]
+        placed.append(f"{name} ({', '.join(texts)})" if len(texts) > 1 else f"{name} at {texts[0]}")
     listed = ", ".join(placed) + ", …" * (len(assembly_mode.joints) > MOST_JOINTS) + f" {unit}"
     return f"{listed}; {turned}" if turned else listed
-
-
-def _decimals(rows: NDArray[np.float64]) -> int:
-    """Decimals with which the two nearest of some rows of numbers differ by ten units of the last; equal ones apart."""
-    gaps = np.max(np.abs(rows[:, None] - rows), axis=-1, initial=0.0)
-    unequal = gaps[gaps > EQUAL * np.max(np.abs(rows), initial=0.0)]
-    return math.ceil(1 - math.log10(np.min(unequal))) if len(unequal) else 0

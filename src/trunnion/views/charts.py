@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from trunnion.views.axis import Abscissa, Array
 
 
-@dataclass(frozen=True)
-class Look:
+class Look(NamedTuple):
     """How a mark looks.
 
     colour: a number of the palette, a name, "#rrggbb", or a share of the scale of colours; mark: a sign at each point,
@@ -34,10 +33,6 @@ class Look:
     hatch: str = ""
     order: float = 2.0
     unclipped: bool = False
-
-    def but(self, **changes: object) -> Look:
-        """The same with something changed."""
-        return replace(self, **changes)  # type: ignore[arg-type]  # names of fields
 
 
 # ---- marks ----------------------------------------------------------------------------------------------------------
@@ -179,7 +174,7 @@ class Axis:
     """An axis of a chart.
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
-    with names, which may be turned by so many degrees; angles: marked at parts of a turn; count: of its marks.
+    with names; angles: marked at parts of a turn; count: of its marks.
     """
 
     title: str = ""
@@ -188,7 +183,6 @@ class Axis:
     log: bool = False
     angles: bool = False
     count: int = 0
-    turned: float = 0.0
     margin: float | None = None
 
 

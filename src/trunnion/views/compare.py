@@ -16,7 +16,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import number, prefixed, with_uncertainty
+from trunnion.results.quantities import joined, number, prefixed, with_uncertainty
 from trunnion.rig.comparison import CAUSES, Verdict
 from trunnion.rig.reading.measurement import Measurement, rms
 from trunnion.views import sweep
@@ -24,19 +24,19 @@ from trunnion.views.axis import Abscissa, Array, names, over_turn
 from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Panel, Plot, Stripe
 from trunnion.views.curves import check_kind, nth, silent
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
-from trunnion.views.readings import plain
-from trunnion.views.sweep import Scale
+from trunnion.views.readings import plain, rounded
+from trunnion.views.sweep import SIGNS, Scale
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SIGNS = {"um": "µm", "deg": "°"}
 APART = 0.05  # of the range of a number: values nearer to each other are the same setting, each time a little off
 TRIFLE = 0.005  # of a number: less is no change of a setting
 KINDS = {"efficiency": "measured and modelled efficiency", "overlay": "signals with residuals"}
 MOST_CONDITIONS = 40  # of the table of a measurement
 MOST_PANELS = 6
-MOST_NAMED = 8  # curves that a legend tells apart
+MOST_NAMED = 8  # curves that a legend tells apart, conditions that an axis has room for
+WIDE = 70  # characters along an axis
 MOST_DRAWN = 6  # conditions of a channel in the report
 MEASURED, MODEL = 0, 1
 RESIDUAL = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
@@ -55,7 +55,7 @@ def measurement_tables(measurement: Measurement) -> list[Table]:
     rows = []
     for item, name in list(zip(conditions, short, strict=True))[:MOST_CONDITIONS]:
         turns = max(course.turns.shape[0] for course in item.courses.values())
-        means = (_figure(_mean(item.courses[key].mean / units[key][1])) if key in item.courses else ""
+        means = (plain(_mean(item.courses[key].mean / units[key][1]), ".5g") if key in item.courses else ""
                  for key in channels)  # fmt: skip
         rows.append([*([name] if head == "condition" else name.split(", ")), f"{turns:,}",
                      *([f"{item.speed * 30 / np.pi:.5g}"] if speeds else []), *means])  # fmt: skip
@@ -70,10 +70,11 @@ def measurement_tables(measurement: Measurement) -> list[Table]:
         unit, factor = courses[0].shown
         every = np.concatenate([course.mean for course in courses]) / factor
         finite = every[np.isfinite(every)]
-        extremes = [_figure(float(finite.min())), _figure(float(finite.max()))] if finite.size else ["none", "none"]
+        extremes = [plain(float(finite.min()), ".5g"), plain(float(finite.max()), ".5g")] if finite.size else [NONE] * 2
         spreads = (rms(np.concatenate([getattr(course, figure) for course in courses])) / factor
                    for figure in ("scatter", "uncertainty"))  # fmt: skip
-        rows.append([name, courses[0].measures, _unit(unit), *extremes, *(_figure(spread, 3) for spread in spreads)])
+        rows.append([name, courses[0].measures, _unit(unit), *extremes,
+                     *(plain(float(spread), ".3g") for spread in spreads)])  # fmt: skip
     title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
     return [*made, Table(title, ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"], rows)]
 
@@ -95,10 +96,6 @@ def _mean(values: Array) -> float:
     finite = values[np.isfinite(values)]
     with np.errstate(over="ignore"):
         return float(finite.mean()) if finite.size else np.nan
-
-
-def _figure(value: float, digits: int = 5) -> str:
-    return "unknown" if not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
 
 
 def _unit(unit: str) -> str:
@@ -150,13 +147,12 @@ def label(result: xr.Dataset, condition: int) -> str:
 
 def setting(value: float, unit: str) -> str:
     """What was set, with its unit: "15°", "62.83 rad/s"."""
-    return text(float(f"{value:.4g}"), unit, f"{float(f'{value:.4g}'):g}".replace("-", "−"))
+    return joined(rounded(float(f"{value:.4g}")), _unit(unit))
 
 
-def text(value: float, unit: str, digits: str = "") -> str:
-    """A number with its unit, which is not scaled any more; digits: how it is written."""
-    space = "" if unit in ("°", "") else "\u00a0"
-    return f"{digits or number(float(value), 3)}{space}{unit}".replace(" ", "\u00a0")
+def text(value: float, unit: str) -> str:
+    """A number with three digits and its unit."""
+    return joined(number(float(value), 3), _unit(unit))
 
 
 def coverage_of(result: xr.Dataset) -> str:
@@ -362,24 +358,23 @@ def efficiency(result: xr.Dataset) -> Chart:
         look, half = nth(k) if others else Look(MODEL), np.nan_to_num(wide[where])
         dash = look.dash if over is not by_number else "none"  # conditions are in no order
         marks += [
-            Line(x[where], model[where], ", ".join(["model", *settings_at]), look.but(dash=dash, mark="_", size=13.0)),
+            Line(x[where], model[where], ", ".join(["model", *settings_at]),
+                 look._replace(dash=dash, mark="_", size=13.0)),
             Line(x[where], measured[where], None if k else f"measured, ±U ({coverage_of(result)})",
                  Look(look.colour if others else MEASURED, dash="none", mark="o", order=3), half, half),
         ]  # fmt: skip
-    at = levels(x)
+    at, sampled = levels(x), np.isfinite(result["phase"].values)
     places = np.unique(at[np.isfinite(at)])
     sides = Scale("", "", places).edges(places, 0.05) if places.size else np.empty(0)
-    limits = (sides[0], sides[-1]) if places.size else (None, None)
-    sampled = np.isfinite(result["phase"].values)
     for k, place in enumerate(places):  # grey where no condition has an answer of the model, with the cause
         if not np.isfinite(model[here := at == place]).any():
             gravest = int(result["status"].values[here][sampled[here]].max())
             why = sweep.CAUSES[gravest] if gravest >= Status.NOT_CONVERGED else "no efficiency"
             marks.append(Stripe(sides[k], sides[k + 1], f"model: {why}"))
     titles = names(result, "condition")
-    named = over is by_number and count <= 24 and max(map(len, titles)) <= 24
-    across = Axis(over.title, limits, list(zip(by_number.values.tolist(), titles, strict=True)) if named else None,
-                  turned=60 if named and sum(map(len, titles)) > 70 else 0)  # fmt: skip
+    named = over is by_number and count <= MOST_NAMED and sum(map(len, titles)) <= WIDE
+    marked = list(zip(by_number.values.tolist(), titles, strict=True)) if named else None
+    across = Axis(over.title, (sides[0], sides[-1]) if places.size else (None, None), marked)
     return Chart(across, Axis("efficiency"), marks, legend=Legend(1))
 
 
@@ -406,16 +401,13 @@ def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel
         Line(x, residual, None, Look(MEASURED, 1.1), close=True),
         *silent(cycle, over, written=False),
     ]
-    peak = np.nanmax(np.abs(np.append(measured, model)), initial=0.0)
-    flat = np.nanmax(np.abs(np.append(residual, wide)), initial=0.0) < 1e-6 * peak  # nothing to look at closer
-    limits = (-1e-3 * peak, 1e-3 * peak) if flat else (None, None)
     error, part = (float(result[key].values[channel, condition]) for key in ("rms", "within"))
     words = [f"RMS {text(error * factor, unit)}"] if np.isfinite(error) else []
     words += [f"{number(100 * part, 3)}\u00a0% within ±U"] if np.isfinite(part) else []
     aside = ": ".join(filter(None, [", ".join(words), verdict(result, channel, condition)]))
     charts = [
         Chart(over, Axis(f"{name} [{unit}]" if unit else name), above, legend=Legend(1, 70)),
-        Chart(over, Axis(f"residual\n[{unit}]" if unit else "residual", limits), below, True, None, aside=aside),
+        Chart(over, Axis(f"residual\n[{unit}]" if unit else "residual"), below, True, None, aside=aside),
     ]
     return Panel("\n".join(wrap(label(result, condition), room)[:2]), charts, 3.3, (2.6, 1.0))
 

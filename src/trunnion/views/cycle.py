@@ -102,7 +102,7 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     factor, unit = prefixed(usual_peak(ease(result), total), "W")
     means = {joint: float(mean) for joint, mean in members(result, "friction_power_mean", "joint").items()}
     rows = [("all joints", total, sum(means[joint] for joint in rubbing), Look("ink", 1.8))]
-    rows += [(joint, row, means[joint], nth(k).but(width=1.4)) for k, (joint, row) in enumerate(lost.items())
+    rows += [(joint, row, means[joint], nth(k)._replace(width=1.4)) for k, (joint, row) in enumerate(lost.items())
              if joint in rubbing]  # fmt: skip
     lines = [Line(x, row, f"{text}, {f'mean {number(mean * factor)} {unit}' if np.isfinite(mean) else 'not solved'}",
                   look, close=True) for text, row, mean, look in rows]  # fmt: skip
@@ -250,7 +250,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             aspect = aspects.get(labels[k], "")
             level = aspect in LEVELS and figure_units[k] == units[i]  # what is none stands in the legend alone
             text = f"{labels[k]}: {aspect and f'{aspect} '}{quantity(float(figures[k]), figure_units[k])}"
-            look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
+            look = nth(1 + len(marks))._replace(width=1.2, dash="dashed")
             marks.append(Rule(figures[k] * scale[0] if level else np.nan, text, look, upright=False))
         charts.append(over_drive(result, title, units[i], {title: values[i]}, marks=marks, scale=scale))
     return _stack("Measures", charts)
@@ -305,9 +305,10 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], result: xr.Dataset) ->
     marks: list[Mark] = [Ring((0.0, 0.0), size * rho, look, square, filled) for size, look, filled in (
         (1 + PIN + WALL, Look("shade", 0.0, order=0.7), 1.0), (1 + PIN, Look("ink", 1.4, order=0.8), 0.0),
         (1.0, Look("muted", 0.8, "dashed", order=2.0), 0.0))]  # fmt: skip
-    x = np.hstack([offset, offset[:, :1]]) if over.closed else offset
-    jumps = np.flatnonzero(~(np.linalg.norm(np.diff(x, axis=1), axis=0) < rho)) + 1
-    marks.append(Line(*np.insert(x, jumps, np.nan, axis=1), None, Look("ink", 2.0, order=3.0)))
+    locus = np.hstack([offset, offset[:, :1]]) if over.closed else offset
+    jumps = np.flatnonzero(~(np.linalg.norm(np.diff(locus, axis=1), axis=0) < rho)) + 1
+    x, y = np.insert(locus, jumps, np.nan, axis=1)
+    marks.append(Line(x, y, None, Look("ink", 2.0, order=3.0)))
     picked = [0, over.values.size // 2, over.values.size - 1]  # positions that are named
     if over.closed:
         angles = over.values[0] + over.period * np.arange(4) / 4
@@ -315,13 +316,13 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], result: xr.Dataset) ->
     for k, index in enumerate(index for index in dict.fromkeys(picked) if np.isfinite(offset[:, index]).all()):
         paint, place = Look(k), offset[:, index]
         at, size = (float(place[0]), float(place[1])), float(np.hypot(*place))
-        marks.append(Ring(at, PIN * rho, paint.but(width=1.1, alpha=0.85, order=1.5), square, 0.07))
-        marks.append(Line(place[:1], place[1:], None, paint.but(dash="none", mark="o", size=5.5, order=5.0)))
+        marks.append(Ring(at, PIN * rho, paint._replace(width=1.1, alpha=0.85, order=1.5), square, 0.07))
+        marks.append(Line(place[:1], place[1:], None, paint._replace(dash="none", mark="o", size=5.5, order=5.0)))
         if np.hypot(*force[:, index]) > WEAK * most:
             start = place * (1 + PIN * rho / size) if size > 1e-9 * rho else place
             tip = start + force[:, index] / most * ARROW * rho
             path = np.stack([start, tip], axis=1)
-            marks.append(Line(path[0], path[1], None, paint.but(width=1.5, order=6.0), arrow=True))
+            marks.append(Line(path[0], path[1], None, paint._replace(width=1.5, order=6.0), arrow=True))
             marks.append(Note(over.say(index), tip[0], tip[1], data=True, size=7.5, outwards=True))
     slack = seats.offsets[end, 2] * factor if seats.along > 0 else np.empty(0)
     if np.isfinite(slack).any():
@@ -409,7 +410,7 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     marks: list[Mark] = [*_states(result, named=True), *silent(result, over)]
     of_all, title = np.where(np.isfinite(margin), margin, np.nan), f"locking margin, all friction{never}"
     marks.append(Line(over.values, of_all, title, Look("ink", 2.0), close=True))
-    marks += [Line(over.values, course, name, nth(k).but(width=1.3), close=True)
+    marks += [Line(over.values, course, name, nth(k)._replace(width=1.3), close=True)
               for k, (name, course) in enumerate(courses.items()) if np.isfinite(course).any()]  # fmt: skip
     marks.append(Rule(1.0, "locks at 1", Look("ink", 1.0, "dashed", order=1.6), upright=False))
     if not largest:  # nothing to draw

@@ -18,6 +18,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from trunnion.errors import Finding, MechanismError, Status
@@ -26,7 +27,6 @@ from trunnion.results.dataset import without_noise
 from trunnion.results.quantities import prefixed
 from trunnion.views.axis import Array, Drawn, abscissa, is_spatial, layout, members, status_text
 from trunnion.views.bodies import HALF, Scenery, Solid, Space, scenery, space
-from trunnion.views.curves import ease, usual_peak
 from trunnion.views.draw import INK, MUTED, PALETTE, name_beside, new, plain
 
 if TYPE_CHECKING:
@@ -95,8 +95,8 @@ def picture(result: xr.Dataset) -> Picture:
 def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     """The mechanism at a position, over the coupler curves, with its names; in the plane over ghosts of others.
 
-    index: if not given, in space that of the largest load of a joint, in the plane an eighth into what can be drawn, so
-    that links do not lie in one line. MechanismError where there is no such position, or nothing to draw.
+    index: if not given, an eighth into what can be drawn, so that links do not lie in one line. MechanismError where
+    there is no such position, or nothing to draw.
     """
     count = result.sizes["position"]
     if index is not None and not 0 <= index < count:
@@ -106,8 +106,7 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
         return _in_space(without_noise(result), index)
     drawing = picture(result)
     if index is None:
-        drawable = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in drawing.tracks.values()], axis=0))
-        index = int(drawable[drawable.size // 8]) if drawable.size else 0
+        index = _eighth(np.all([np.isfinite(track).all(axis=0) for track in drawing.tracks.values()], axis=0))
     low, high = np.array(drawing.box[:2]) - 0.09 * drawing.size, np.array(drawing.box[2:]) + 0.09 * drawing.size
     width, height = high - low
     figure = new("Mechanism", result, min(max(7.0 * height / width, 2.6), 8.0) + 0.5)
@@ -120,6 +119,12 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     sketch(axes, drawing, index)
     name_points(axes, drawing, index)
     return figure
+
+
+def _eighth(drawable: NDArray[np.bool_]) -> int:
+    """The position that is drawn if none is named; 0 if no position has a place for all links."""
+    places = np.flatnonzero(drawable)
+    return int(places[places.size // 8]) if places.size else 0
 
 
 def bare(axes: Axes, low: Array, high: Array, title: Sequence[str]) -> Axes:
@@ -338,21 +343,13 @@ FEW = 400  # pieces of a curve
 
 
 def _in_space(result: xr.Dataset, index: int | None) -> Figure:
-    """The mechanism at a position, with its reactions; if not told that of the largest that can be drawn."""
-    look, telling, forces = scenery(space(result)), index is None, _forces(result)
-    if index is None:  # without forces one in the first eighth
-        drawable = np.flatnonzero(look.shown.drawable)
-        index = int(drawable[drawable.size // 8])
-        sizes = np.array([np.fmax.reduce(np.linalg.norm(of, axis=1)) for of in forces.values()])
-        most = usual_peak(ease(result), sizes) if forces else 0.0
-        if most > 0:
-            each = np.where(np.isfinite(sizes) & (sizes <= most * (1 + 1e-12)), sizes, -1.0).max(axis=0)[drawable]
-            if each.max() > 0 and np.ptp(each) > 1e-6 * most:
-                index = int(drawable[each.argmax()])
+    """The mechanism at a position, with its reactions."""
+    look = scenery(space(result))
+    index = _eighth(look.shown.drawable) if index is None else index
     if not look.shown.drawable[index]:
         what = f"position {index} cannot be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, "index", "choose a solved position"))
-    arrows, most = _reactions(look, forces, index)
+    arrows, most = _reactions(look, result, index)
     margin = 0.07 * look.diagonal  # around all that may be seen, with the key below, and no narrow strip
     reach = np.array([look.box[:2], look.box[2:], *(end for _, end in arrows)])
     low, high = reach.min(axis=0) - margin * np.array([1.0, 2.6]), reach.max(axis=0) + margin
@@ -360,10 +357,8 @@ def _in_space(result: xr.Dataset, index: int | None) -> Figure:
     more = np.array([max(0.0, height * 7.2 / HEIGHTS[1] - width), max(0.0, width * HEIGHTS[0] / 7.2 - height)]) / 2
     low, high = low - more, high + more
     figure = new("Mechanism", result, float(np.clip(7.2 * (high - low)[1] / (high - low)[0], *HEIGHTS)) + 0.7)
-    where, *others = facts(result, index)
-    where += ", where the load of a joint is largest" * bool(arrows and telling)
     apart = "coincident joints drawn apart" * any(look.shown.shifts.values())
-    axes = bare(figure.subplots(), low, high, [where, *others, apart])
+    axes = bare(figure.subplots(), low, high, [*facts(result, index), apart])
     paint(axes, look, index)
     for start, end in arrows:
         _arrow(axes, start, end, REACTION)
@@ -375,8 +370,7 @@ def _in_space(result: xr.Dataset, index: int | None) -> Figure:
 def paint(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = ()) -> None:
     """Bodies and curves at a position, without a letter; only: links that have a colour, all if none is named.
 
-    What is nearer is painted over what is farther, by the depths of the middles of small facets. The outline of a body
-    is what looks away of a body a little larger.
+    What is nearer is painted over what is farther, by the depths of the middles of small facets.
     """
     bodies, camera = look.shown, look.camera
     faces, depths, colours = list[Array](), list[Array](), list[Array]()
@@ -390,20 +384,16 @@ def paint(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = ()) -> 
             strokes.append((np.stack([points[:-1], points[1:]], axis=1), INK, 0.7))
             continue
         paint = np.array(to_rgb(_colour(bodies, solid.paint, only)))
-        for grown in (OUTLINE * bodies.size, 0.0):
-            corners = (facets(solid, bodies.size, grown) @ matrix.T + origin) @ camera
-            normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-            lengths = np.linalg.norm(normals, axis=1, keepdims=True)  # 0 where two corners fall together
-            normals /= np.where(lengths > 0, lengths, 1.0)
-            seen = (normals[:, 2] > 0) == (grown == 0.0)
-            faces.append(corners[seen][..., :2])
-            depths.append(corners[seen][..., 2].mean(axis=1))
-            if grown:
-                colours.append(np.broadcast_to(to_rgb(INK), (int(seen.sum()), 3)))
-                continue
-            bright = np.clip(normals[seen] @ LIGHT, 0.0, 1.0)[:, None]  # lighter towards the light, darker away from it
-            lit = paint * (0.62 + 0.38 * bright)
-            colours.append(lit + (1 - lit) * 0.38 * np.maximum(0.0, bright - 0.55) / 0.45)
+        corners = (facets(solid, bodies.size) @ matrix.T + origin) @ camera
+        normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)  # 0 where two corners fall together
+        normals /= np.where(lengths > 0, lengths, 1.0)
+        front = normals[:, 2] > 0
+        faces.append(corners[front][..., :2])
+        depths.append(corners[front][..., 2].mean(axis=1))
+        bright = np.clip(normals[front] @ LIGHT, 0.0, 1.0)[:, None]  # lighter towards the light, darker away from it
+        lit = paint * (0.52 + 0.48 * bright)
+        colours.append(lit + (1 - lit) * 0.38 * np.maximum(0.0, bright - 0.55) / 0.45)
     polygons, edges = [*np.concatenate(faces)], [*np.concatenate(colours)]
     depth, widths, fills = [*np.concatenate(depths)], [0.35] * len(edges), [(*edge, 1.0) for edge in edges]
     for pieces, colour, width in strokes:  # lines among the bodies, a little nearer than they are
@@ -437,9 +427,16 @@ def _pieces(track: Array) -> Array:
     return np.asarray(pieces[np.isfinite(pieces).all(axis=(1, 2))], dtype=float)
 
 
-def _reactions(look: Scenery, every: dict[str, Array], index: int) -> tuple[list[tuple[Array, Array]], float]:
-    """Start and end of the arrows of each joint's forces that can be seen, and the largest of all, N."""
-    here = {name: of[..., index] for name, of in every.items()}
+def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tuple[Array, Array]], float]:
+    """Start and end of the arrows of each joint's forces that can be seen, and the largest of all, N.
+
+    They are the loads on the ends of its bearing or guide, its reaction where it has none: a small reaction may bear on
+    both ends of a pin with large forces.
+    """
+    here = {name: row[None, :, index] for name, row in members(result, "reaction_force", "joint").items()}
+    for name, ends in members(result, "end_load", "joint").items():
+        solid = ends[np.isfinite(ends).any(axis=(1, 2)), :, index]
+        here |= {name: solid} if len(solid) else {}
     sizes = {name: np.linalg.norm(of, axis=1) for name, of in here.items()}
     most = max((float(size) for of in sizes.values() for size in of if np.isfinite(size)), default=0.0)
     arrows = []
@@ -457,14 +454,6 @@ def _reactions(look: Scenery, every: dict[str, Array], index: int) -> tuple[list
             if np.hypot(*(end - start)) > 0.01 * look.diagonal:
                 arrows.append((start, end))
     return arrows, most
-
-
-def _forces(result: xr.Dataset) -> dict[str, Array]:
-    """Of each joint the loads on the ends of its bearing or guide, its reaction where it has none, (force, axis,
-    position), N: a small reaction may bear on both ends of a pin with large forces."""
-    forces, ends = members(result, "reaction_force", "joint"), members(result, "end_load", "joint")
-    solid = {joint: rows[np.any(np.isfinite(rows), axis=(1, 2))] for joint, rows in ends.items()}
-    return {joint: solid[joint] if len(solid.get(joint, ())) else force[None] for joint, force in forces.items()}
 
 
 def _arrow(axes: Axes, start: Array, end: Array, colour: str) -> None:
@@ -527,25 +516,22 @@ def name_joints(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (
 SIDES = 16  # of a rod
 RINGS = 10  # of a ball
 STEP = 0.03  # rods are cut into pieces of this share of the size: with twice that, crossing bars sort wrongly
-OUTLINE = 0.0026  # share of the size
 LIGHT = np.array([-0.35, 0.55, 0.76])  # from the left and above, in the picture's frame
 JOINT = "#f7f8fa"
 TURN = np.linspace(0, 2 * np.pi, SIDES + 1)
 
 
-def facets(solid: Solid, size: float, grown: float = 0.0) -> Array:
-    """Facets (n, corner, 3) in the link's frame, counter-clockwise from outside; grown: larger all round, m."""
-    radius = solid.radius + grown
+def facets(solid: Solid, size: float) -> Array:
+    """Facets (n, corner, 3) in the link's frame, counter-clockwise from outside."""
     if solid.kind == "rod":
-        return _rod(solid.points, radius, grown, STEP * size)
+        return _rod(solid.points, solid.radius, STEP * size)
     if solid.kind == "wire":
         return np.empty((0, 4, 3))
     if solid.kind == "ball":
         up = np.linspace(-np.pi / 2, np.pi / 2, RINGS + 1)[:, None]
         sphere = [np.cos(up) * np.cos(TURN), np.cos(up) * np.sin(TURN), np.sin(up) + 0 * TURN]
-        return _between(solid.points[0] + radius * np.stack(sphere, axis=-1))
-    middle, *halves = solid.points
-    u, v, w = (half * (1 + grown / np.linalg.norm(half)) for half in halves)
+        return _between(solid.points[0] + solid.radius * np.stack(sphere, axis=-1))
+    middle, u, v, w = solid.points
     w = w if np.cross(u, v) @ w > 0 else -w
     sides = []
     for a, b, c in ((u, v, w), (v, w, u), (w, u, v)):
@@ -562,7 +548,7 @@ def _between(grid: Array) -> Array:
     return np.stack(corners, axis=2).reshape(-1, 4, 3)
 
 
-def _rod(points: Array, radius: float, grown: float, step: float) -> Array:
+def _rod(points: Array, radius: float, step: float) -> Array:
     """A round rod along a line through points, cut into pieces, and its two ends, wide ones in rings."""
     line = points[:1]
     for start, end in pairwise(points):
@@ -570,8 +556,6 @@ def _rod(points: Array, radius: float, grown: float, step: float) -> Array:
         line = np.vstack([line, start + np.linspace(0, 1, count + 1)[1:, None] * (end - start)])
     pieces = np.diff(line, axis=0)
     pieces /= np.linalg.norm(pieces, axis=1)[:, None]
-    line[0] -= grown * pieces[0]
-    line[-1] += grown * pieces[-1]
     along = np.vstack([pieces[:1], pieces[:-1] + pieces[1:], pieces[-1:]])  # across a corner lies its mitre
     x, rings = np.eye(3)[int(np.argmin(np.abs(pieces[0])))], list[Array]()
     for place, before, mitre in zip(line, np.vstack([pieces[:1], pieces]), along, strict=True):

@@ -445,7 +445,7 @@ def _curves(plan: Arrangement, cell: Cell, causes: Mapping[int, str]) -> list[Ma
         marks.append(Line(x, y, label, look))
         at_gap = np.isfinite(y) & (np.isnan(np.append(y[:1], y[:-1])) | np.isnan(np.append(y[1:], y[-1:])))
         if at_gap.any():
-            marks.append(Line(x[at_gap], y[at_gap], None, look.but(dash="none", mark="x", size=7.0, order=4.0)))
+            marks.append(Line(x[at_gap], y[at_gap], None, look._replace(dash="none", mark="x", size=7.0, order=4.0)))
         if compared:
             name = None if k else "ideal" if other is None else "ideal, dashed"
             marks.append(Line(x, ideal[:, k], name, Look("ink", 1.0, "long")))

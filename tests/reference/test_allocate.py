@@ -238,7 +238,7 @@ def same_figures(results):
 )
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
 def test_no_figure_depends_on_the_steps(measure, criterion):
-    model, samples = fourbar(measures={"m": measure}), 400
+    model, samples = fourbar(measures={"m": measure}), 200
     same_figures([trunnion.allocate(model, criterion=criterion, steps=steps, samples=0) for steps in (7, 12, 120, 361)])
     if criterion == "yield":
         asked = {"criterion": criterion, "target": 0.9, "samples": samples}

@@ -19,7 +19,7 @@ from trunnion.statistics.distributions import uniforms
 from trunnion.studies.tolerance.linear import study
 
 STEPS = 25
-DENSE = 20_000  # positions at which a largest deviation is as good as found
+DENSE = 5_000  # positions at which a largest deviation is as good as found
 
 
 def planar(name, **options):

@@ -375,7 +375,7 @@ class AssemblyStudy:
         if 0 < need < np.inf:
             largest = int(np.nanargmax(self.arrays["needed_clearance"]))
             parts = self.arrays["uniform_part"][:, :, largest].sum(axis=1)
-            carried = sorted(zip(parts, self.system.joints, strict=True), reverse=True)
+            carried = sorted(zip(parts.round(6), self.system.joints, strict=True), key=lambda each: -each[0])
             text = ", ".join(f"{name} {100 * part:.0f} %" for part, name in carried if part > LEAST_PART)
             figures.append(
                 Figure("smallest_clearance.place", "  at", self.place("needed_clearance").removeprefix("at "), "")

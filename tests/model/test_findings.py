@@ -110,7 +110,7 @@ MISTAKES = {
             ("friction: {pair_factor: 1}", "friction", "needs 'coefficient'")],
         "links: [ground, crank]}": [
             ("links: [ground, crank], pin: {fit: 20 mm}}", "joints.A.pin.fit", "'20 mm' is not a fit"),
-            ("links: [ground, crank], pin: {fit: H7/g6}}", "joints.A.pin.fit", "'H7/g6' states no diameter"),
+            ("links: [ground, crank], pin: {fit: H7/g6}}", "joints.A.pin.fit", "'H7/g6' is not a fit"),
             ("links: [ground, crank], pin: {fit: 20H7/g6}}", "joints.A.pin.fit", "'20' has no unit"),
             ("links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}",
              "joints.A.pin.fit", "beside radius")],

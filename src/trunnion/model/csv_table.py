@@ -193,8 +193,7 @@ def _columns(
         if len(numbers) < 2:
             what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a {noun} needs two"
             raise MechanismError(Finding(what, remedy=f"add rows such as {example}", line=rows[-1][0]))
-        findings = _wrong_units(rows[0], units, kinds) or _unreadable(numbers, separator, len(kinds))
-        if findings:
+        if findings := [*_wrong_units(rows[0], units, kinds)] or [*_unreadable(numbers, separator, len(kinds))]:
             raise MechanismError(findings[:SHOWN])
     except MechanismError as error:
         raise MechanismError([finding.at(label, finding.line) for finding in error.findings]) from None
@@ -241,9 +240,8 @@ def _number(cell: str, separator: str) -> str:
     return text if _NUMBER.fullmatch(text) and abs(float(text)) < float("inf") else ""
 
 
-def _wrong_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> list[Finding]:
+def _wrong_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> Iterator[Finding]:
     """Units of a header that are not those of the columns."""
-    findings = []
     for cell, text, kind in zip(header[1], units, kinds, strict=True):
         try:
             dimension = unit(text)[1] if text else None
@@ -252,23 +250,18 @@ def _wrong_units(header: Row, units: Sequence[str], kinds: Sequence[Kind]) -> li
                 raise UnitError(what)
         except UnitError as error:
             remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
-            findings.append(Finding(f"{cell[:40]}: {error.what[:120]}", remedy=remedy, line=header[0]))
-    return findings
+            yield Finding(f"{cell[:40]}: {error.what[:120]}", remedy=remedy, line=header[0])
 
 
-def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> list[Finding]:
+def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> Iterator[Finding]:
     """Rows that are no pair of numbers, or no number in a single column."""
-    findings = []
     for line, cells in rows:
         bad = [cell for cell in cells if not _number(cell, separator)]
         if len(cells) != columns:
-            what = f"has {counted(len(cells), 'cell')}, the rows before have {columns}"
-            findings.append(Finding(what, line=line))
+            yield Finding(f"has {counted(len(cells), 'cell')}, the rows before have {columns}", line=line)
         elif bad:
             what = f"'{bad[0][:40]}' is not a finite number" if bad[0] else "a number is missing"
-            remedy = "write a number such as 12.5 or 1.25e1, units in the header"
-            findings.append(Finding(what, remedy=remedy, line=line))
-    return findings
+            yield Finding(what, remedy="write a number such as 12.5 or 1.25e1, units in the header", line=line)
 
 
 def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:

@@ -60,10 +60,8 @@ class Fit:
         if isinstance(source, Fit):
             return source
         match = _FIT.match(source.strip()) if isinstance(source, str) else None
-        if not isinstance(source, str) or not match:
+        if not isinstance(source, str) or not match or not match["size"]:
             raise problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
-        if not match["size"]:
-            raise problem(f"{source!r} states no diameter", "write it before the classes, as 20 mm H7/g6")
         try:
             size = Quantity.read(match["size"], KINDS["length"])
         except UnitError as error:

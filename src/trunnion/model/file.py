@@ -90,8 +90,7 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
     path, findings, only = Path(path), list(findings), set(sections)
     if not findings:
         return []
-    text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
-    data, lines = entries_of(text, _file_type(path))
+    data, lines = read_entries(path)
     rows = _rows(data)
 
     def stands(finding: Finding) -> bool:

@@ -91,8 +91,6 @@ class Quantity:
         kind = kind or self.kind
         needed, dimension = kind.with_article, self.expression.dimension(names)
         if self.expression.bare and dimension is not None and kind.dimensions and NUMBER not in kind.dimensions:
-            if self.evaluate() == 0:
-                return None
             remedy = f"write a unit, such as {kind.example}, or a plain number in {kind.unit}"
             raise UnitError(f"'{self.source}' has no unit where {needed} is needed", remedy)
         if not kind.accepts(dimension):

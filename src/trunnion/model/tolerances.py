@@ -229,8 +229,6 @@ class Varying(Numbers):
 
         What varies as measured or over a full turn has no tolerance to choose, and no price.
         """
-        if not self.costs:
-            return []
         fixed = {tolerance.path for tolerance in self.tolerated() if not tolerance.can_be_chosen}
         paths = [(path, cost) for name, cost in self.costs.items() for path in self.cost_paths(name)]
         return [self.price(path, cost) for path, cost in paths if path not in fixed]

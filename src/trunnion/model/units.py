@@ -113,10 +113,8 @@ def fits(dimension: Dimension, other: Dimension) -> bool:
     return dimension[:3] == other[:3] and (any(other[:3]) or other[3] != 0 or dimension[3] == 0)
 
 
-def si_unit(dimension: Dimension | None) -> str:
-    """SI unit of a dimension; empty for a plain number, whose unit only its use tells."""
-    if dimension is None:
-        return ""
+def si_unit(dimension: Dimension) -> str:
+    """SI unit of a dimension."""
     unit_of_kind = next((kind.unit for kind in KINDS.values() if dimension in kind.dimensions), None)
     return unit_of_kind or dimension_text(dimension).removeprefix("in ")
 

@@ -305,20 +305,19 @@ def _of_number(mechanism: Varying, section: str, rest: str) -> tuple[str, Locati
     if not of or key not in keys:
         of, key = rest, ""
     stated: Mapping[str, Any] = getattr(mechanism, "variations" if section == "tolerances" else section)
-    resolve = mechanism.parameter_set.resolve
-    if section == "costs":
-        paths = {*mechanism.cost_paths(of)}
-        names = [cost for cost in stated if cost == of or paths.intersection(mechanism.cost_paths(cost))]
-        if not names or not key:
-            raise MechanismError(Finding(f"there is no cost '{rest}'", f"costs.{rest}", nearest(of, stated)))
-        return "", (section, names[0], key)
+
+    def paths(name: str) -> list[str]:
+        return mechanism.cost_paths(name) if section == "costs" else [mechanism.parameter_set.resolve(name)]
+
     try:
-        path = resolve(of)
+        meant = paths(of)
     except MechanismError as error:
         raise MechanismError(replace(error.findings[0], where=f"{section}.{rest}")) from None
-    name = next((other for other in stated if resolve(other) == path), of)
+    name = next((other for other in stated if other == of or not {*meant}.isdisjoint(paths(other))), of)
     if section == "errors":
-        return f"errors.{path}", (section, name)
+        return f"errors.{meant[0]}", (section, name)
+    if section == "costs" and (name not in stated or not key):
+        raise MechanismError(Finding(f"there is no cost '{rest}'", f"costs.{rest}", nearest(of, stated)))
     short = key in ("", "limits") and (name not in stated or stated[name].model_fields_set <= {"limits"})
     return "", (section, name) if short else (section, name, key or "limits")
 

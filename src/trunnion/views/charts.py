@@ -20,7 +20,7 @@ class Look(NamedTuple):
     """How a mark looks.
 
     colour: a number of the palette, a name, "#rrggbb", or a share of the scale of colours; mark: a sign at each point,
-    hollow or filled; hatch: of an area; order: what has a larger one lies above; unclipped: also over the frame.
+    hollow or filled; hatch: of an area; order: what has a larger one lies above.
     """
 
     colour: int | float | str = 0
@@ -32,7 +32,6 @@ class Look(NamedTuple):
     alpha: float | None = None
     hatch: str = ""
     order: float = 2.0
-    unclipped: bool = False
 
 
 # ---- marks ----------------------------------------------------------------------------------------------------------
@@ -224,14 +223,13 @@ class Panel:
 class Plot:
     """A figure: panels in rows of so many columns under a title.
 
-    width: in inches, 0 as the columns ask for; note: of what is not drawn, beneath; shared: the panels, of one chart
-    each, have common axes and one legend at the right; colours: what the colours of all charts mean.
+    width: in inches, 0 as the columns ask for; shared: the panels, of one chart each, have common axes and one legend
+    at the right; colours: what the colours of all charts mean.
     """
 
     title: str
     panels: Sequence[Panel]
     columns: int = 1
     width: float = 0.0
-    note: str = ""
     shared: bool = False
     colours: ColourScale | None = None

@@ -189,9 +189,9 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             across, up = (Axis(f"F{'xyz'[axis]} [{unit}]", limits, margin=0.13, count=5) for axis in plane)
             panels.append(Chart(across, up, marks, title=joint if plane == PLANES[0] else "", legend=None, equal=True))
     columns = min(len(panels), 2 if len(panels) in (2, 4) else 3) or 1
-    note = "" if ideal is None else "dashed: without friction"
+    dashed = "" if ideal is None else "; dashed: without friction"
     charts = [Panel("", [chart], 6.8 / columns) for chart in panels]
-    return Plot("Polar diagrams of the joint reactions", charts, columns, 7.4, note)
+    return Plot(f"Polar diagrams of the joint reactions{dashed}", charts, columns, 7.4)
 
 
 # ---- motion and measures --------------------------------------------------------------------------------------------

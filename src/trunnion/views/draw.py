@@ -125,8 +125,6 @@ def figure(result: xr.Dataset, plot: Plot) -> Figure:
                 if axes is not stacked[-1]:
                     axes.set_xlabel("")
                     axes.tick_params(labelbottom=False)
-    if plot.note:
-        sheet.text(0.012, 0.005, plain(plot.note), fontsize=7.5, color=MUTED)
     return sheet
 
 
@@ -262,7 +260,7 @@ def _colour(name: int | float | str) -> str:
 def _stroke(look: Look) -> dict[str, Any]:
     """The look of a line as matplotlib takes it."""
     style: dict[str, Any] = {"color": _colour(look.colour), "linewidth": look.width, "linestyle": DASHES[look.dash],
-                             "zorder": look.order, "alpha": look.alpha, "clip_on": not look.unclipped}  # fmt: skip
+                             "zorder": look.order, "alpha": look.alpha}  # fmt: skip
     if look.mark:
         style |= {"marker": look.mark, "markersize": look.size}
     if look.hollow:

@@ -39,16 +39,15 @@ BEFORE, AFTER = 4, 0
 class Estimate:
     """One unknown as it is read: in degrees, mm or SI.
 
-    short: its name without the section that all numbers of joints have; tail: the unit behind a number; half: expanded
-    uncertainty, NaN where the data do not tell it; places: decimals that this leaves; limit: −1 or 1 where it is on its
-    lower or upper limit; shares: of each source in its variance; lacking: why there is no estimate.
+    short: its name without the section that all numbers of joints have; half: expanded uncertainty, NaN where the data
+    do not tell it; places: decimals that this leaves; limit: −1 or 1 where it is on its lower or upper limit;
+    shares: of each source in its variance; lacking: why there is no estimate.
     """
 
     name: str
     short: str
     paths: tuple[str, ...]
     unit: str
-    tail: str
     start: float
     value: float
     half: float
@@ -64,14 +63,13 @@ class Estimate:
     @property
     def start_text(self) -> str:
         """Where the search began, with its unit."""
-        return f"{self.start:.4g}{self.tail}".replace("-", "−")
+        return plain(self.start, ".4g", self.unit)
 
     def say(self, value: float, unit: bool = True) -> str:
         """A value with the digits of the uncertainty."""
         if not math.isfinite(value):
             return number(value)
-        digits = f"{value + 0.0:.{self.places}f}" if self.places <= 7 else f"{value:.4g}"
-        return (digits + self.tail if unit else digits).replace("-", "−")
+        return plain(value + 0.0, f".{self.places}f" if self.places <= 7 else ".4g", self.unit if unit else "")
 
     def cells(self) -> list[str]:
         """Estimate ± U, its interval, degrees of freedom, and what most of its variance is due to."""
@@ -104,8 +102,7 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
         half = float(quantile(freedom)) * deviation if identifiable else math.nan
         shares = dict(zip(names(result, "source"), map(float, result["share"].values[p]), strict=True))
         rows.append(Estimate(
-            name, name.removeprefix("joints.").removeprefix("dimensions."), tuple(paths[p]), unit,
-            unit if unit in ("", "°") else f"\u00a0{unit}", start, value, half,
+            name, name.removeprefix("joints.").removeprefix("dimensions."), tuple(paths[p]), unit, start, value, half,
             max(decimals(half), 0) if identifiable else 4, lower, upper, freedom, int(result["limit"].values[p]),
             identifiable, shares, lacking,
         ))  # fmt: skip

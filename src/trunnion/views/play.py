@@ -86,13 +86,12 @@ def _panel(every: xr.Dataset, i: int) -> Panel:
         marks.append(Rule(limit * factor, "limit", Look(1, 1.2, "dotted"), upright=False))
     extreme = float(np.sum(result["extreme_worst_case"].values))
     if np.isfinite(extreme):
-        # the abscissa goes on beyond the last position of a cycle as it does before it
-        at, time = float(result["extreme_time"]), result["time"].values
-        k = int(np.clip(np.searchsorted(time, at), 1, max(len(time) - 1, 1)))
-        place = x[0] if len(x) < 2 else x[k - 1] + (x[k] - x[k - 1]) * (at - time[k - 1]) / (time[k] - time[k - 1])
-        look = Look("ink", dash="none", mark="o", size=6, unclipped=usual >= most)  # on the frame, but not beyond it
+        time, places = (np.append(row, 2 * row[-1] - row[-2 % len(row)]) for row in (result["time"].values, x))
+        place = np.interp(
+            [float(result["extreme_time"])], time, places
+        )  # of a closed cycle also behind its last position
         name = " at ".join(attribute(every, "places")[i]).strip()
-        marks.append(Line(np.array([float(place)]), np.array([extreme * factor]), name, look))
+        marks.append(Line(place, np.array([extreme * factor]), name, Look("ink", dash="none", mark="o", size=6)))
     marks += [*silent(every, over), *([outside(most, unit)] if usual < most else [])]
     top = 1.05 * usual * factor if usual < most else None
     title = f"worst case of {every['measure'].values[i]} [{label}]"

@@ -422,7 +422,7 @@ def _levels(title: str, every: Array, bounds: tuple[float, float]) -> ColourScal
 
 def _lost(x: Array, y: Array, size: float) -> list[Mark]:
     """Rings around points at which contact is lost at some position."""
-    look = Look("limit", dash="none", mark="o", size=size, hollow=True, order=4, unclipped=True)
+    look = Look("limit", dash="none", mark="o", size=size, hollow=True, order=4)
     return [Line(x, y, "contact lost at some position", look)] if x.size else []
 
 

@@ -171,22 +171,23 @@ def course_kind(mechanism: Fields, measure: Measure) -> Kind:
             formula = measure.formula
             return _of_dimension(formula.dimension(operand_dimensions(mechanism, measure)) if formula else None)
         return ANY
-    return MEASURES[measure.kind].quantities[-1 if slides(mechanism, measure) else 0]
+    kind = MEASURES[measure.kind]
+    section = {"load on a joint": "loads", "spring": "springs"}.get(str(kind.of), "joints")
+    return kind.quantities[-1 if part_turns(mechanism, section, measure.subject) is False else 0]
 
 
-def slides(mechanism: Fields, measure: Measure) -> bool:
-    """Whether the joint, driver, load or spring that a measure is of slides and does not turn."""
-    load = mechanism.loads.get(measure.subject)
-    if MEASURES[measure.kind].of == "load on a joint":
-        return load is None or load.resisting_torque is None
-    name: str | None = measure.subject
-    if MEASURES[measure.kind].of == "spring":
-        spring = mechanism.springs.get(measure.subject)
-        name = spring.joint if spring else None
-        if name is None:  # between two points
-            return True
-    joint = mechanism.effective_joints.get(name or "")
-    return joint is not None and not joint.pair.turns
+def part_turns(mechanism: Fields, section: str, name: str) -> bool | None:
+    """Whether what a part is of turns, or slides; None where that is not said, or a finding of its own."""
+    part = getattr(mechanism, section).get(name)
+    if isinstance(part, Gear):
+        return not part.slides
+    if isinstance(part, Load):
+        return part.resisting_torque is not None
+    if isinstance(part, Spring) and part.joint is None:  # between two points
+        return False
+    joint = part.joint if isinstance(part, Spring) else part.moves if isinstance(part, Driver) else None
+    stated = mechanism.effective_joints.get(joint or name)
+    return None if stated is None else stated.pair.turns
 
 
 def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:

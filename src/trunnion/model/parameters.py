@@ -21,7 +21,7 @@ from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED
-from trunnion.model.fields import Fields, course_kind, dimension_kinds, drive_kind, place_kind
+from trunnion.model.fields import Fields, course_kind, dimension_kinds, drive_kind, part_turns, place_kind
 from trunnion.model.joint_parts import DEFAULT_LAW, Contact, Friction, Joint, Losses
 from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import AT, Driver, Gear, Point
@@ -97,7 +97,7 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
     for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
             complete = part.complete() if isinstance(part, Driver | Gear) else part
-            turns = _turns(mechanism, section, name, part)
+            turns = part_turns(mechanism, section, name)
             for entry in walk(complete, f"{section}.{name}", (section, name)):
                 spoken = entry.quantity.names if section == "loads" else ()
                 varies = any(operand in moving or PLACED in operand for operand in spoken)
@@ -105,17 +105,6 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
                 rules = () if signed else entry.rules  # a length along a slide has a sign
                 kind = _kind_in_place(mechanism, section, part, turns, entry)
                 yield replace(entry, kind=kind, varies=varies, rules=rules)
-
-
-def _turns(mechanism: Fields, section: str, name: str, part: Any) -> bool | None:
-    """Whether what a part is of turns, or slides; None where that is not said, or a finding of its own."""
-    if section == "gears":
-        return not part.slides
-    if section == "springs" and part.joint is None:
-        return False
-    joint = part.joint if section == "springs" else part.moves if section == "drivers" and part.moves else name
-    stated = mechanism.effective_joints.get(joint)
-    return None if stated is None else stated.pair.turns
 
 
 def _kind_in_place(mechanism: Fields, section: str, part: Any, turns: bool | None, entry: Entry) -> Kind:

@@ -310,7 +310,7 @@ class Course(NamedTuple):
         return place.value, float(self.courses.edges[0]) if place.everywhere else place.time
 
 
-class Found(NamedTuple):
+class Integrated(NamedTuple):
     """A motion with its books at its rows, and its course, None if it does not begin."""
 
     solution: Solution
@@ -318,7 +318,7 @@ class Found(NamedTuple):
     course: Course | None
 
     @classmethod
-    def of(cls, run: Run, solution: Solution, time: Array, between: Callable[[Array], Books]) -> Found:
+    def of(cls, run: Run, solution: Solution, time: Array, between: Callable[[Array], Books]) -> Integrated:
         """time: s, of the rows, up to the end; between: the books at some rising times, s."""
         if solution.ended is not None:
             time = np.append(time[time < solution.end], solution.end)
@@ -348,7 +348,7 @@ def _residual(works: Array, energies: Array) -> Array:
 # ---- the result -------------------------------------------------------------------------------------------------
 
 
-def result_of(motion: FreeMotion, integrated: Found, duration: float, run: Run) -> Result:
+def result_of(motion: FreeMotion, integrated: Integrated, duration: float, run: Run) -> Result:
     """The result of a motion in time. run: of the mechanism as it was stated, its joints in play included."""
     solution, books, contacts = integrated.solution, integrated.books, motion.contacts
     mechanism, system = run.system.mechanism, run.system
@@ -448,7 +448,7 @@ def spectrum(time: Array, forces: Array) -> tuple[Array, Array]:
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
-def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) -> Iterator[Figure]:
+def _summary(motion: FreeMotion, integrated: Integrated, run: Run, scales: Scales) -> Iterator[Figure]:
     """The figures that one looks at first; none of a motion that does not begin."""
     solution, course, names = integrated.solution, integrated.course, list(run.system.mechanism.drivers)
     if course is None:

@@ -20,7 +20,7 @@ from trunnion.dynamics.integrate import FINEST, MOST_EVALUATIONS
 from trunnion.dynamics.motor import applied_to, drives
 from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Dynamics, Walks
-from trunnion.dynamics.result import Books, Found, filled, result_of
+from trunnion.dynamics.result import Books, Integrated, filled, result_of
 from trunnion.dynamics.solution import CLOSE
 from trunnion.dynamics.start import CYCLES, initial_row, places
 from trunnion.dynamics.state import FreeMotion, Mode
@@ -132,16 +132,16 @@ def simulated(
     check_start(motion, row, load_places.limits)
     time = np.linspace(0.0, duration, steps + 1)
 
-    def found(tolerance: float) -> Found:
+    def integrated(tolerance: float) -> Integrated:
         motion.begin(None)
         integration = integrator_of(motion)(motion, rates, duration, tolerance, load_places, progress, evaluations)
         solution = integration.run(row.copy())
-        return Found.of(run, solution, time, lambda when: filled(motion, solution, when, bare))
+        return Integrated.of(run, solution, time, lambda when: filled(motion, solution, when, bare))
 
-    return result_of(motion, _balanced(found, tolerance), duration, run)
+    return result_of(motion, _balanced(integrated, tolerance), duration, run)
 
 
-def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
+def _balanced(find: Callable[[float], Integrated], tolerance: float) -> Integrated:
     """A motion whose energy account is right to ACCOUNT, or MISSED times a coarse tolerance, if a finer one has it so.
 
     A step over a bend of a force that is not known beforehand, as where a reaction turns round, may be wrong by more

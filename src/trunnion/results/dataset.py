@@ -229,12 +229,12 @@ class Scales(NamedTuple):
 
     def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:
         """Figures, 0 where they are rounding, but for those that tell of the solution."""
-
-        def noise(figure: Figure) -> bool:
-            value = figure.value
-            return isinstance(value, float) and not figure.numerical and abs(value) <= self.floor(figure.unit)
-
-        return [replace(figure, value=0.0) if noise(figure) else figure for figure in figures]
+        return [
+            replace(figure, value=0.0)
+            if isinstance(figure.value, float) and not figure.numerical and abs(figure.value) <= self.floor(figure.unit)
+            else figure
+            for figure in figures
+        ]
 
 
 @functools.cache

@@ -27,20 +27,15 @@ def _coordinate(
     parts = {"": ("", long_name), "_velocity": ("/s", f"rate of the {long_name}"),
              "_acceleration": ("/s^2", f"second derivative of the {long_name}")}  # fmt: skip
     return {
-        f"{name}{rate}": _motion((dim,), f"{unit}{per}", text, f"{column}{rate}", space, k < usual)
+        f"{name}{rate}": Variable(
+            (dim,), f"{unit}{per}", text, space=space, column=f"{column}{rate}",
+            tables="usual motion" if k < usual else "motion",
+        )
         for k, (rate, (per, text)) in enumerate(parts.items())
-    }
+    }  # fmt: skip
 
 
-Dims = tuple[str, ...]
-
-
-def _motion(dims: Dims, unit: str, long_name: str, column: str, space: str = "", usual: bool = True) -> Variable:
-    """A vector of the motion."""
-    tables = "usual motion" if usual else "motion"
-    return Variable(dims, unit, long_name, space=space, column=column, tables=tables)
-
-
+_motion = functools.partial(Variable, tables="usual motion")  # a vector of the motion
 _rest = functools.partial(Variable, column="", tables="rest")  # what only the table of everything has
 _seat = functools.partial(Variable, part="seats")  # what only mechanisms whose pins have seats have
 _error = functools.partial(Variable, part="errors")  # what only mechanisms with errors have
@@ -53,14 +48,16 @@ VARIABLES: dict[str, Variable] = {
                   usual=2),
     **_coordinate("joint_slide", "joint", "m", "slide of the joint, second link against first", "slide", usual=2),
     **_coordinate("link_angle", "link", "rad", "angle of the link's x axis", "angle", "planar"),
-    "link_position": _motion(LA, "m", "place of the link's origin", "", "spatial"),
-    "link_rotation": _motion(("link", "component"), "1", "unit quaternion of the link's axes", "rotation", "spatial"),
-    "link_angular_velocity": _motion(LA, "rad/s", "angular velocity of the link", "angular_velocity", "spatial"),
+    "link_position": _motion(LA, "m", "place of the link's origin", space="spatial", column=""),
+    "link_rotation": _motion(
+        ("link", "component"), "1", "unit quaternion of the link's axes", space="spatial", column="rotation"),
+    "link_angular_velocity": _motion(
+        LA, "rad/s", "angular velocity of the link", space="spatial", column="angular_velocity"),
     "link_angular_acceleration": _motion(
-        LA, "rad/s^2", "angular acceleration of the link", "angular_acceleration", "spatial"),
-    "point_position": _motion(PA, "m", "place of the point", ""),
-    "point_velocity": _motion(PA, "m/s", "velocity of the point", "velocity", usual=False),
-    "point_acceleration": _motion(PA, "m/s^2", "acceleration of the point", "acceleration", usual=False),
+        LA, "rad/s^2", "angular acceleration of the link", space="spatial", column="angular_acceleration"),
+    "point_position": _motion(PA, "m", "place of the point", column=""),
+    "point_velocity": Variable(PA, "m/s", "velocity of the point", column="velocity", tables="motion"),
+    "point_acceleration": Variable(PA, "m/s^2", "acceleration of the point", column="acceleration", tables="motion"),
     "reaction_force": Variable(JA, "N", "reaction on the second link by the first", column="reaction"),
     "reaction_moment": Variable(
         J, "N m", "reaction moment on the second link, about the joint's point", column="reaction_moment"),

@@ -13,7 +13,7 @@ from manual.test_cli import EXAMPLES
 from trunnion.cli import app as cli
 from trunnion.cli.options import PLOT_KINDS, over, points
 from trunnion.cli.result import QUIET, say, show_rows
-from trunnion.cycle.model_measures import NamedNumber, vocabulary
+from trunnion.cycle.model_measures import Named, vocabulary
 from trunnion.errors import Finding, Severity
 from trunnion.views.cycle import PLOTS
 
@@ -100,11 +100,10 @@ def test_the_list(program):
     assert all(
         name in out for name in ("transmission_angle:Q", "velocity:piston.Q.x", "stroke-position", "O.pin.radius")
     )
-    words = vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"}))
-    numbers, measures = ({one.name: one for one in each} for each in (words.numbers, words.measures))
-    assert numbers["crank"] == NamedNumber("crank", "dimensions.crank", "m", 0.052, "52mm", True)
-    assert measures["drive-torque"].stated
-    assert measures["effort:O"].value == measures["drive-torque"].value
+    names = {each.name: each for each in vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"}))[0]}
+    assert names["crank"] == Named("crank", "sweep", "m", 0.052, "52mm")
+    assert names["drive-torque"].use == "stated"
+    assert names["effort:O"].value == names["drive-torque"].value
 
 
 HEAD = ["", "linear", "searched", "Monte Carlo", "of variance"]

@@ -6,7 +6,7 @@ import os
 import socket
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from typer import Argument, Option
 
@@ -14,9 +14,6 @@ from trunnion.cli.options import Model, placed, verb
 from trunnion.cli.result import YAML, check_target, end, line, say, show_rows, write_text, wrote
 from trunnion.errors import Finding, MechanismError, counted
 from trunnion.files import folder, whole
-
-if TYPE_CHECKING:
-    from trunnion.cycle.model_measures import NamedMeasure, NamedNumber
 
 HEAD = ["name", "value", "unit"]
 
@@ -69,21 +66,21 @@ def _list(model: Model) -> None:
 
     mechanism = model.read()
     with model.lines():
-        words = vocabulary(mechanism)
-    for swept, use in ((True, "parameters for --set and sweep --over"), (False, "parameters for --set only")):
-        numbers = [number for number in words.numbers if number.swept is swept]
-        if numbers:
-            show_rows(use, [*HEAD, "written as"], [_row(number, number.written) for number in numbers])
-    measures = sorted(words.measures, key=lambda measure: not measure.stated)
-    title = "measures: figures of the cycle, or values at the start"
-    show_rows(title, [*HEAD, "what"], [_row(measure, measure.text) for measure in measures])
-    say(placed(words.findings, model.file, ["measures"]))
-
-
-def _row(entry: "NamedNumber | NamedMeasure", text: str) -> list[str]:
-    """Name, value, unit and what it is of a number that can be set or a measure."""
-    value = f"{entry.value + 0.0:.6g}" if math.isfinite(entry.value) else ""
-    return [entry.name, value, "" if entry.unit in ("1", "SI") else entry.unit, text]
+        names, findings = vocabulary(mechanism)
+    groups = {
+        ("sweep",): ("parameters for --set and sweep --over", "written as"),
+        ("set",): ("parameters for --set only", "written as"),
+        ("stated", "measure"): ("measures: figures of the cycle, or values at the start", "what"),
+    }
+    for uses, (title, text) in groups.items():
+        rows = [
+            [entry.name, f"{entry.value + 0.0:.6g}" if math.isfinite(entry.value) else "",
+             "" if entry.unit in ("1", "SI") else entry.unit, entry.text]
+            for entry in names if entry.use in uses
+        ]  # fmt: skip
+        if rows:
+            show_rows(title, [*HEAD, text], rows)
+    say(placed(findings, model.file, ["measures"]))
 
 
 USUAL = 8765

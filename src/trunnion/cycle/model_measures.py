@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,21 +133,15 @@ def _over_cycle(
     figures = figures_of(run, asked, method)
     gaps = seating_of(run, method).gaps if run.seats and asked else np.zeros((2, 0))
     for measure in asked:
-        where = f"measures.{measure.name}"
         if np.isfinite(figures[measure.name]):
             if np.size(gaps):
                 share = float(np.sum(gaps[1] - gaps[0])) / run.cycle.duration
                 without = "without" if measure.rule in SIGNS or measure.rule in BETWEEN else "a pin loses contact in"
                 notes[measure.name] = f"{without} {share:.2g} of the cycle"
         elif measure.at is not None and np.size(gaps):
-            notes[measure.name] = "not valid: a pin loses contact at its place"
-            what = "the measure has no figure: a pin loses contact at its place"
-            remedy = "state another place, or analyse with --seat free"
-            findings.append(Finding.note("measure.contact_lost", where, what, remedy))
+            notes[measure.name] = "a pin loses contact there: state another place, or analyse with --seat free"
         elif measure.rule.startswith("dead centre"):
-            ends = "minimum", "maximum: leave out as"
-            what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
-            notes[measure.name] = f"no {what} within the cycle; for a {other}"
+            notes[measure.name] = "none within the cycle; the other one has as: place-of-minimum, or no as"
         elif measure.rule == "time ratio":
             notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
         elif measure.formula:
@@ -180,83 +174,54 @@ def _of_a_cycle(run: Run, name: str) -> Measure:
 TIMES = ("at", "over", "within", "along")  # of a measure, and no number to sweep over: they say what is looked at
 
 
-@dataclass(frozen=True)
-class NamedNumber:
-    """A number of the model: its shortest name and its path, SI unit and value, and the text as it was written.
+class Named(NamedTuple):
+    """A number or a measure by its name, its SI unit and value, NaN where there is none, and what it is in words.
 
-    value: NaN of one that changes with the motion; swept: whether `--over` takes it as well as `--set`.
+    use: "sweep" of a number that `--set` and `sweep --over` take, "set" of one that `--set` alone takes, "stated" of a
+    measure of the model, "measure" of one that can be named. text: of a number as it was written.
     """
 
     name: str
-    path: str
+    use: str
     unit: str
     value: float
-    written: str
-    swept: bool
-
-
-@dataclass(frozen=True)
-class NamedMeasure:
-    """A measure by its name, what it is, its SI unit and value; NaN where there is none.
-
-    stated: whether the model states it; value: its figure over the cycle, of one that has none by itself that at the
-    start.
-    """
-
-    name: str
     text: str
-    unit: str
-    value: float
-    stated: bool
-
-
-@dataclass(frozen=True)
-class Vocabulary:
-    """What `--set` and `--over` take, and what `--measure`, `measures:` and the channels of a rig take.
-
-    findings: which measures of the model cannot be told, and why.
-    """
-
-    numbers: tuple[NamedNumber, ...]
-    measures: tuple[NamedMeasure, ...]
-    findings: tuple[Finding, ...] = ()
 
 
 @np.errstate(all="ignore")
-def vocabulary(mechanism: Mechanism) -> Vocabulary:
-    """Every number and every measure of a mechanism by name, with unit and present value.
+def vocabulary(mechanism: Mechanism) -> tuple[list[Named], list[Finding]]:
+    """Every number and every measure of a mechanism by name, with unit and present value: of a measure its figure over
+    the cycle, of one that has none by itself that at the start. Then which measures of the model have none, and why.
 
     Raises MechanismError if the structure does not determine the motion.
     """
-    run = prepare(mechanism)
+    run, kinds, values = prepare(mechanism), mechanism.parameter_kinds(), mechanism.parameters()
+    shortest = dict[str, str]()
+    for ending, paths in mechanism.parameter_names.endings.items():
+        path = paths[0]
+        if len(paths) == 1 and len(ending) < len(shortest.get(path, path)) and mechanism.path_of(ending) == path:
+            shortest[path] = ending  # it means this number, and no dimension or whole path
+    names = []
+    for path, entry in mechanism.parameter_set.entries.items():
+        section, _, rest = path.partition(".")
+        name, value = rest if section == "dimensions" else shortest.get(path, path), single(values.get(path, np.nan))
+        swept = path in values and not (section == "measures" and rest.split(".")[1] in TIMES)
+        text = str(entry.quantity.source)
+        names.append(Named(name, "sweep" if swept else "set", kinds[path].unit, value, text))
     of_cycle = watched(run, np.zeros(1), FrictionMethod())
     figures = dict(zip((item.name for item in of_cycle.measures), of_cycle.figures, strict=True))
     listed = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
     open_ = run.determinacy is not None and any(item.severity is Severity.ERROR for item in run.determinacy.findings())
     courses = [item for item in listed if item.single(run.system) and (item.of_motion or not open_)]
-    starts, measures = courses_of(run, courses, np.zeros(1), FrictionMethod())[0], []
+    starts = courses_of(run, courses, np.zeros(1), FrictionMethod())[0]
     for measure in listed:
         value = float(figures.get(measure.name, np.nan))
         if not np.isfinite(value) and measure.name in starts:
             value = single(starts[measure.name][0])
-        unit, is_stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
-        measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, is_stated))
-    return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(of_cycle.findings))
-
-
-def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
-    values, names = mechanism.parameters(), mechanism.parameter_names
-    kinds, shortest = mechanism.parameter_kinds(), dict[str, str]()
-    for ending, paths in names.endings.items():
-        path = paths[0]
-        if len(paths) == 1 and len(ending) < len(shortest.get(path, path)) and mechanism.path_of(ending) == path:
-            shortest[path] = ending  # it means this number, and no dimension or whole path
-    for path, entry in mechanism.parameter_set.entries.items():
-        value = single(values[path]) if path in values else float("nan")
-        place = path.split(".")
-        swept = path in values and not (place[0] == "measures" and place[2] in TIMES)
-        name = path.removeprefix("dimensions.") if place[0] == "dimensions" else shortest.get(path, path)
-        yield NamedNumber(name, path, kinds[path].unit, value, str(entry.quantity.source), swept)
+        use = "stated" if measure.name in mechanism.measures else "measure"
+        unit = measure.figure_unit(run.system, run.values)
+        names.append(Named(measure.name, use, unit, value, measure.of.long_name))
+    return names, list(of_cycle.findings)
 
 
 def _others(run: Run) -> Iterator[Measure]:

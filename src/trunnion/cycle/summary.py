@@ -204,16 +204,13 @@ def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     if not means.has_useful_work:
         note = f"{NOTHING_USEFUL}: {STATE_USEFUL}"
     elif np.isfinite(value):
-        note = "the useful loads do no net work" if value == 0 else "the useful loads supply work" * bool(value < 0)
-    elif np.any(course.status >= Status.NOT_CONVERGED):
-        note = "not every position is solved"
+        note = "the useful loads do no net work, or supply work" * bool(value <= 0)
     elif means.supposed > MOST_SUPPOSED:
         note = f"pins do not settle, which may change {means.supposed:.0%} of the work"
     elif not np.isfinite(means.drive_power.value):
-        note = "not every position between the steps is solved"
+        note = "not every position is solved"
     else:
-        drives = means.drive_power.net < 0
-        note = "the loads drive, the driver absorbs work" if drives else "the driver does no net work"
+        note = "the driver does no net work, or absorbs work"
     yield Figure("efficiency", "efficiency of the cycle", value, note=note)
     yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
     if cycle.at.ideal is not None:

@@ -185,9 +185,8 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
             yield Finding.error("assembly.past_dead_centre", f"drivers.{driver}.moves", what, remedy, at=at)
         else:
             why = "these links do not close" if everywhere or np.any(places == 0) else "not reached from the start"
-            if everywhere and module.redundant:
-                why = "these links are over-constrained and close with special dimensions only"
-                remedy = "see `trunnion assemble` for the play that they need, or use joints with more freedoms"
+            if module.redundant:
+                remedy = "these links are over-constrained: see `trunnion assemble` for the play that they need"
             yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, at=at)
 
 

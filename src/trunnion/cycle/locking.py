@@ -23,7 +23,7 @@ from trunnion.cycle.summary import member_units, result_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import Figure, attribute, codes, encoded, finding_rows
+from trunnion.results.attributes import Figure, codes, encoded
 from trunnion.results.dataset import described, with_variables
 from trunnion.results.variables import LOCKING, along_positions
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -86,15 +86,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     }
     result = with_variables(result, described(arrays, along_positions(LOCKING), member_units(run.system)))
     result["locking_state"].attrs.update(codes("flag", LockingState))
-    findings = {}
-    if run.seats:
-        what = f"locking takes the seats of {', '.join([seat.joint for seat in run.seats])} for the margin and for "
-        what += "where it locks forward; all else is of pins in the middle of their play: the other states and their "
-        what += "ranges, the motion backward, critical multiples of single joints"
-        note = Finding.note("locking.pins_centred", "joints", what, joints=[seat.joint for seat in run.seats])
-        findings["findings"] = [*attribute(result, "findings"), *finding_rows([note])]
-    ranges = {} if course is None else {"locking_ranges": course.attribute(time, near)}
-    return result.assign_attrs(encoded({**ranges, **findings}))
+    return result if course is None else result.assign_attrs(encoded({"locking_ranges": course.attribute(time, near)}))
 
 
 def report_figures(run: Run) -> list[Figure]:

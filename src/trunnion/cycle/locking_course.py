@@ -363,12 +363,14 @@ class LockingCourse:
         delivered, useful, others = np.where(np.abs(means) <= error, 0.0, means)
         if np.isfinite(useful) and not useful > 0:
             return None
-        if (locked := courses.share(np.isin(courses.states, BACK_LOCKED))) > SHORT:
-            return Figure(name, subject, None, place=f"in {locked:.2%} of the cycle", note="it locks")
-        if LockingState.UNSOLVED in self.all_states() or not np.isfinite(delivered + useful):
-            return Figure(name, subject, None, note="not every position is solved")
-        if others > max(np.sum(error[:2]), LITTLE * useful):
-            note = "masses, springs or loads that are not useful supply work too"
+        states, others_help = self.all_states(), others > max(np.sum(error[:2]), LITTLE * useful)
+        unsolved = LockingState.UNSOLVED in states or not np.isfinite(delivered + useful)
+        none = [
+            ("it locks", courses.share(np.isin(courses.states, BACK_LOCKED)) > SHORT),
+            ("not every position is solved", unsolved),
+            ("other loads, masses or springs supply work too", others_help),
+        ]
+        if note := next((reason for reason, holds in none if holds), ""):
             return Figure(name, subject, None, note=note)
         pushes = self.all_states() & PUSHES
         value = min(float(delivered / useful), 1.0)
@@ -402,9 +404,6 @@ class LockingCourse:
     def ranges(self, near: float = NEAR) -> list[LockingRange]:
         """The parts of the cycle in which its state stays the same, in their order; after them those that run, but with
         a margin below `near`."""
-        return self.run.once(("locking ranges", self.method, near), lambda: self._ranges(near))
-
-    def _ranges(self, near: float) -> list[LockingRange]:
         courses = self.course.courses
         parts: list[tuple[LockingState | None, float, float]] = [
             (STATES[code], low, high)

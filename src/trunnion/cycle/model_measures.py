@@ -96,7 +96,8 @@ class Watched:
 
 def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:
     """The model's measures over the cycle. time: positions of the result, s."""
-    measures, figures, findings, notes, extremes = run.once(("measures", method), lambda: _over_cycle(run, method))
+    of_cycle = run.once(("measures", method), lambda: _over_cycle(run, method))
+    measures = of_cycle.measures
     values = np.full((len(measures), len(time)), np.nan)
     with np.errstate(all="ignore"):
         courses = courses_of(run, measures, time, method)[0] if measures else {}
@@ -109,14 +110,11 @@ def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:
         if measure.turning(run.system):
             rate = np.asarray(rate_of_angle(measure.coordinate(run.system), run.walk(time)), float)
             unwrap_row(row, np.broadcast_to(rate, time.shape), float(time[1] - time[0]) if len(time) > 1 else 0.0)
-    return Watched(run, measures, values, figures, findings, notes, extremes)
+    return replace(of_cycle, values=values)
 
 
-def _over_cycle(
-    run: Run, method: FrictionMethod
-) -> tuple[list[Measure], Array, list[Finding], dict[str, str], dict[str, tuple[float, float]]]:
-    """The measures that a cycle has and the figures of those that state one; why others are left out, and what is to be
-    known of a figure; the extremes of the others."""
+def _over_cycle(run: Run, method: FrictionMethod) -> Watched:
+    """The same at no position."""
     measures, findings, notes = list[Measure](), list[Finding](), dict[str, str]()
     for name in run.system.mechanism.measures:
         try:
@@ -147,7 +145,8 @@ def _over_cycle(
         elif measure.formula:
             notes[measure.name] = "it has no value at some positions: check roots and divisions, or state over:"
     row = np.array([figures.get(item.name, np.nan) for item in measures])
-    return measures, row, findings, notes, {name: (least[name], most[name]) for name in least}
+    extremes = {name: (least[name], most[name]) for name in least}
+    return Watched(run, measures, np.zeros((len(measures), 0)), row, findings, notes, extremes)
 
 
 def _of_a_cycle(run: Run, name: str) -> Measure:

@@ -227,12 +227,12 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     def largest(variable: str, i: int, unit: str) -> Place | None:
         return course.extreme(variable, i, of=magnitude, panels=course.valid, unit=unit)
 
-    points = [(top, k) for k in range(len(run.system.points)) if (top := largest("point_error", k, "m")) is not None]
-    if points:
-        highest = max(top.value for top, _ in points) * (1 - ALIKE)
-        top, k = next(pair for pair in points if pair[0].value >= highest)  # of equal ones the first
-        most = f"largest: {'.'.join(run.system.points[k])}"
-        yield course.figure("point_error_max", "position error", top, "m", most)
+    points = {".".join(point): largest("point_error", k, "m") for k, point in enumerate(run.system.points)}
+    tops = {point: top for point, top in points.items() if top is not None}
+    if tops:
+        highest = max(top.value for top in tops.values()) * (1 - ALIKE)
+        point = next(point for point, top in tops.items() if top.value >= highest)  # of equal ones the first
+        yield course.figure("point_error_max", "position error", tops[point], "m", f"largest: {point}")
     for i, (joint, entry) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in entry.links or joint in run.system.mechanism.drivers:
             continue

@@ -148,6 +148,20 @@ def step_of(run: Run, values: Mapping[str, Number], count: int) -> Array:
     return step
 
 
+def sides_of(run: Run, values: Values, share: float = 1.0) -> tuple[Values, Values, Array]:
+    """Numbers of mechanisms moved along their derivatives to either side, and by how much, (lane, 1): a share of the
+    step of a difference, 0 without derivatives."""
+    step = share * step_of(run, values, lanes_of(values))
+    below, above = (
+        {
+            path: primal(value) + sign * step * derivative(value) if isinstance(value, Dual) else value
+            for path, value in values.items()
+        }
+        for sign in (-1.0, 1.0)
+    )
+    return below, above, step
+
+
 def where_known(measure: Measure, status: NDArray[np.int8], number: Number) -> Number:
     """The course of a measure, NaN where the status of the positions says that it has no answer."""
     if measure.of_motion:

@@ -22,7 +22,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.errors import Status
-from trunnion.measures.evaluation import NumpyKernel, SeatedKernel, lanes_of, picked, step_of
+from trunnion.measures.evaluation import NumpyKernel, SeatedKernel, lanes_of, picked, sides_of
 from trunnion.measures.figures import Panels, Read, Reading, combined, turn
 from trunnion.measures.measures import Measure, angles, within
 from trunnion.measures.positions import ends_by_name, moved
@@ -220,7 +220,7 @@ class Group:
         of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * lanes_of(values))
         bends: Number = tracked(of, self.bends, at)  # NaN where it is far off
         if any(isinstance(value, Dual) for value in values.values()):
-            below, above, step = _sides(run, values, SHORT)
+            below, above, step = sides_of(run, values, SHORT)
             shifts = shifts_of(of, self.bends, bends, at, (below, above)) if np.any(step) else np.zeros_like(bends)
             bends = Dual(bends, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
         lost = np.any(np.isnan(primal(bends)), axis=1)
@@ -253,11 +253,8 @@ class Group:
             others = _joined(np.full((count, 1), start), others, np.full((count, 1), end))
             nominal = np.concatenate([[start], nominal[inner], [end]])
         others = _sorted(others)
-        place = np.clip(np.searchsorted(nominal, self.edges + close, side="right") - 1, 0, len(nominal) - 2)
-        after = self.edges - nominal[place]
-        share = np.clip(after / np.maximum(nominal[place + 1] - nominal[place], close), 0.0, 1.0)
-        share[after <= close] = 0.0
-        edges = linear(others, lambda array: array[:, place] * (1.0 - share) + array[:, place + 1] * share)
+        shares = np.array([np.interp(self.edges, nominal, unit) for unit in np.eye(len(nominal))])
+        edges = linear(others, lambda array: array @ shares)
         ones = np.flatnonzero(np.diff(nominal) <= close)  # bends that are one of the nominal mechanism alone
         ones = ones[(nominal[ones] >= start - close) & (nominal[ones] <= end + close)]
         if not len(ones) and not len(fixed):
@@ -416,7 +413,7 @@ class Group:
         plain = {path: primal(value) for path, value in values.items()}
         alone = self._of_their_own(picked(plain, lanes), times)
         if any(isinstance(value, Dual) for value in values.values()):
-            *sides, step = _sides(self.run, values, 1.0)
+            *sides, step = sides_of(self.run, values)
             below, above = (self._of_their_own(picked(side, lanes), {}) for side in sides)
             width = 2 * step[lanes, 0]
             for name, read in alone.items():
@@ -485,20 +482,6 @@ class Group:
 
 
 # ---- lanes ----------------------------------------------------------------------------------------------------
-
-
-def _sides(run: Run, values: Values, share: float) -> tuple[Values, Values, Array]:
-    """Numbers of mechanisms moved along their derivatives to either side, and by how much, (lane, 1): a share of the
-    step of a difference, 0 without derivatives."""
-    step = share * step_of(run, values, lanes_of(values))
-
-    def beside(sign: float) -> Values:
-        return {
-            path: primal(value) + sign * step * derivative(value) if isinstance(value, Dual) else value
-            for path, value in values.items()
-        }
-
-    return beside(-1.0), beside(1.0), step
 
 
 def _blocks(count: int, size: int) -> Iterator[Lanes]:

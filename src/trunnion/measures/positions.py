@@ -96,7 +96,7 @@ def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
     except UnitError as error:
         raise MechanismError(Finding(f"'{at}' is not a position: {error.what}", "at", remedy)) from None
     except KeyError:
-        raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
+        raise MechanismError(Finding(f"'{at}' is not a position", "at", remedy)) from None
     if kind.unit == "rad" and not isinstance(at, str) and (doubts := [*in_radians("at", value)]):
         raise MechanismError(replace(doubts[0], severity=Severity.ERROR))
     return value, kind.unit == "s"

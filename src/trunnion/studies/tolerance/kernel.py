@@ -21,7 +21,7 @@ from trunnion.measures.evaluation import (
     SeatedKernel,
     lanes_of,
     shape_of,
-    step_of,
+    sides_of,
     where_known,
 )  # fmt: skip
 from trunnion.measures.many import Many
@@ -76,11 +76,11 @@ class LoadedKernel(MotionKernel):
         curves, status = self._solved(values, primal(time))
         if not any(isinstance(number, Dual) for number in (time, *values.values())):
             return curves, status
-        step, sides = step_of(self.run, values, lanes_of(values)), []
-        for sign in (-1.0, 1.0):
-            numbers = {path: primal(number) + sign * step * derivative(number) if isinstance(number, Dual) else number
-                       for path, number in values.items()}  # fmt: skip
-            sides.append(self._solved(numbers, primal(time) + sign * step * derivative(time))[0])
+        below_values, above_values, step = sides_of(self.run, values)
+        sides = [
+            self._solved(numbers, primal(time) + sign * step * derivative(time))[0]
+            for sign, numbers in ((-1.0, below_values), (1.0, above_values))
+        ]
         width = np.where(step > 0, 2 * step, np.inf)
         return {
             name: tuple(

@@ -9,6 +9,7 @@ motion of the breaks included.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -318,7 +319,7 @@ class Reading:
 
     def _dwell(self, panels: Panels) -> Number:
         """Share of the time within the band."""
-        row = linear(panels.coefficients, lambda array: array[0])
+        row = panels.coefficients[0]
         low, high = self.measure.within or (-np.inf, np.inf)
         share: Number = above(row, low) if np.isfinite(low) else 2.0
         share = share - above(row, high) if np.isfinite(high) else share
@@ -379,15 +380,11 @@ def _across(panels: Panels) -> tuple[Panels, Made]:
     count = np.shape(primal(panels.coefficients))[0]
     unit = (np.arange(ORDER) == 0) * 1.0
 
-    def broad(number: Number) -> Number:
-        """With axes for panels and coefficients."""
-        return linear(number, lambda array: np.asarray(array)[..., None, None])
-
-    rows = [linear(panels.coefficients, lambda array, k=k: array[k]) for k in range(count)]  # type: ignore[misc]
-    offset = [row - broad(panels.mean(lambda rows, k=k: rows[k])) * unit for k, row in enumerate(rows)]  # type: ignore[misc]
+    middle = [panels.mean(lambda rows, k=k: rows[k])[..., None, None] for k in range(count)]  # type: ignore
+    offset = [panels.coefficients[k] - middle[k] * unit for k in range(count)]
     path = panels.made(combined(_stacked, *offset))
     moments = [[path.mean(lambda rows, i=i, j=j: rows[i] * rows[j]) for j in range(count)] for i in range(count)]  # type: ignore[misc]
-    along = [broad(part) for part in direction(moments)]
+    along = [part[..., None, None] for part in direction(moments)]
     if count == 2:
         return panels.made(combined(_stacked, offset[1] * along[0] - offset[0] * along[1])), first
     reach = offset[0] * along[0] + offset[1] * along[1] + offset[2] * along[2]
@@ -439,14 +436,9 @@ def direction(moments: Sequence[Sequence[Number]]) -> list[Number]:
         xp = namespace(*twice)
         angle = 0.5 * xp.arctan2(*twice)
         return [xp.cos(angle), xp.sin(angle)]
-    real = np.stack([np.stack([np.asarray(primal(n)) for n in row], axis=-1) for row in moments], axis=-2)
-    if any(isinstance(n, Dual) for row in moments for n in row):
-        slopes = np.stack([np.stack([np.asarray(derivative(n)) for n in row], axis=-1) for row in moments], axis=-2)
-        vectors: Number = eigh(Dual(*np.broadcast_arrays(real, slopes))).vectors
-    else:  # by rising eigenvalue; NaN where a matrix is
-        sound = np.all(np.isfinite(real), axis=(-2, -1), keepdims=True)
-        vectors = np.where(sound, np.linalg.eigh(np.where(sound, real, np.eye(3))).eigenvectors, np.nan)
-    return [vectors[..., k, -1] for k in range(3)]
+    matrix = combined(lambda *n: np.moveaxis(_stacked(*n).reshape(3, 3, -1), -1, 0), *itertools.chain(*moments))
+    along = eigh(matrix).vectors[..., -1]  # by rising eigenvalue; NaN where a matrix is
+    return [along[:, k] if isinstance(matrix, Dual) else along.real[:, k] for k in range(3)]
 
 
 def turn(axes: Sequence[Number], before: Sequence[Number], axis: str) -> Number:

@@ -249,7 +249,7 @@ class Group:
         fixed = np.unique(nominal[(nominal >= start - close) & (nominal <= end + close)] if self.against else [])
         if self.ends or not cycle.periodic:  # the ends of a window stay
             inner = (nominal > start + close) & (nominal < end - close)
-            others = _clipped(linear(others, lambda array: array[:, inner]), start, end)
+            others = _clipped(others[:, inner], start, end)
             others = _joined(np.full((count, 1), start), others, np.full((count, 1), end))
             nominal = np.concatenate([[start], nominal[inner], [end]])
         others = _sorted(others)
@@ -259,7 +259,7 @@ class Group:
         ones = ones[(nominal[ones] >= start - close) & (nominal[ones] <= end + close)]
         if not len(ones) and not len(fixed):
             return edges
-        more = _joined(linear(others, lambda array: array[:, ones]), np.tile(fixed, (count, 1)))
+        more = _joined(others[:, ones], np.tile(fixed, (count, 1)))
         return _sorted(_joined(edges, _clipped(more, primal(edges)[:, :1], primal(edges)[:, -1:])))
 
     # ---- courses of others --------------------------------------------------------------------------------
@@ -301,17 +301,16 @@ class Group:
         for block in _blocks(count, min(max(1, at_once), READ)):
             block_values = picked(values, block) if count > len(block) else values
             block_edges = _taken(edges, block)
-            low = linear(block_edges, lambda array: array[:, :-1])
-            half = linear(block_edges, lambda array: np.diff(array) / 2)
-            time = _wide(block_edges) if self.at_place else _wide(low) + _wide(half) * (1.0 + POINTS)
+            low, half = block_edges[:, :-1], (block_edges[:, 1:] - block_edges[:, :-1]) / 2
+            time = block_edges[..., None] if self.at_place else low[..., None] + half[..., None] * (1.0 + POINTS)
             parts, status, moved_times = self._evaluated(block_values, time)
-            nominal, weights = self._nominal(time), _wide(half)
+            nominal, weights = self._nominal(time), half[..., None]
             if moved_times is not None and not self.at_place:  # how much time of each mechanism the Gauss nodes count
                 weights = linear(moved_times, lambda array: array @ FIT.T @ RATE @ ON_GAUSS)
             for measure in self.measures:
                 rows = self._rows(measure, parts, nominal, time)
                 if self.at_place:
-                    courses = Panels.constant(linear(rows, lambda array: array[..., 0, 0]))
+                    courses = Panels.constant(rows[..., 0, 0])
                 else:
                     none = np.zeros((len(block), panels), bool)
                     courses = Panels(low, half, linear(rows, lambda array: array @ FIT.T), weights, none)
@@ -330,7 +329,7 @@ class Group:
         place = within(run, flat)
         evaluated = moved(run, values, place)
         alone = len(primal(evaluated)) == 1
-        curves, status = self.kernel.courses(values, linear(evaluated, lambda array: array[0]) if alone else evaluated)
+        curves, status = self.kernel.courses(values, evaluated[0] if alone else evaluated)
         full = (max(lanes_of(values), len(primal(evaluated))), *np.shape(primal(time))[1:])
 
         def shaped(array: Any) -> Any:
@@ -491,16 +490,12 @@ def _blocks(count: int, size: int) -> Iterator[Lanes]:
 
 def _middles(edges: Number, panels: Flags) -> Number:
     """Middles of some panels."""
-    return linear(edges, lambda array: (array[:, 1:] + array[:, :-1])[:, panels] / 2)
+    return ((edges[:, 1:] + edges[:, :-1]) / 2)[:, panels]
 
 
 def _taken(number: Number, lanes: Lanes) -> Number:
     """Some lanes of a number, which may be one for all."""
-    return linear(number, lambda array: array if len(array) == 1 else array[lanes])
-
-
-def _wide(number: Number) -> Number:
-    return linear(number, lambda array: array[..., None])
+    return number if len(primal(number)) == 1 else number[lanes]
 
 
 def _sorted(number: Number) -> Number:

@@ -28,7 +28,6 @@ from trunnion.solve import loads
 from trunnion.solve.loads import Stated, stated_walk
 from trunnion.solve.margin import margin_in
 from trunnion.solve.seating import NO_LOAD, UNSETTLED, Crossing, seating_of
-from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -151,9 +150,7 @@ def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
         if tolerance.path.startswith("dimensions.") and len(links) > 1:
             name = tolerance.path.removeprefix("dimensions.")
             names = [path.removeprefix("links.").replace(".points.", ".") for path in used]
-            more = f" and {len(names) - MOST_PLACES} more" if len(names) > MOST_PLACES else ""
-            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(names[:MOST_PLACES])}{more}): these "
-            what += "links deviate together, by the same amount"
+            what = f"one tolerance sets {', '.join(names)}: these links deviate together, by the same amount"
             remedy = "if the links are made separately, give each a dimension of its own with its own tolerance"
             yield Finding.note("tolerance.shared_dimension", tolerance.path, what, remedy, name=name, links=links)
 
@@ -179,8 +176,7 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
             what = f"{nowhere}: {by or 'an earlier group has no position'}"
             yield Finding.error("assembly.gap", where, what, remedy, at=at, gaps=gaps)
         elif system.inverse and (driver := next(past, None)):
-            what = f"has no position {at}: {system.inverse.moves[driver]} is past a dead centre of {driver}, which "
-            what += "cannot move it on from there"
+            what = f"has no position {at}: {system.inverse.moves[driver]} is past a dead centre of {driver}"
             remedy = "end the motion before it"
             yield Finding.error("assembly.past_dead_centre", f"drivers.{driver}.moves", what, remedy, at=at)
         else:
@@ -317,8 +313,7 @@ def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
     spans = [run.system.span(run.values, name) for name in drivers]
     several = len(spans) > 1 or cycle.mechanism.gears or run.cycle.advances
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
-        what = "the drivers, gears and threads have no common period; the cycle is the longest period, "
-        what += f"{run.cycle.duration:g} s"
+        what = f"drivers, gears and threads have no common period; the cycle is the longest, {run.cycle.duration:g} s"
         remedy = "means and efficiency are over that time; choose speeds with a common period, or ranges"
         yield Finding.warning("cycle.not_common", "drivers", what, remedy, duration=run.cycle.duration)
 
@@ -328,9 +323,7 @@ def _rough(cycle: Cycle) -> Iterator[Finding]:
     course, tolerance = cycle.course, Accuracy().tolerance
     if course is not None and not cycle.run.seats and course.courses.loosened > 1.0:
         share = course.courses.loosened * tolerance
-        what = (
-            f"something changes very finely over the cycle: its figures are accurate to {share:.1g} of the largest only"
-        )
+        what = f"something changes very finely over the cycle: its figures are accurate to {share:.1g} of the largest"
         remedy = "look for singular positions, and for loads, laws or tables that change many times, or at random"
         yield Finding.warning("cycle.rough", "", what, remedy, share=share)
 
@@ -388,9 +381,8 @@ def _slack(cycle: Cycle) -> Iterator[Finding]:
         low, high = (0.0 if top is None else top.value / abs(radius) for top in ends)
         if low < -least_force and high > least_force:
             places = " and ".join(course.told(top) for top in ends if top is not None)
-            what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; a rope goes "
-            what += "slack where it would push"
-            remedy = "a closed chain or belt bears both ways; a rope needs a load or a speed that keep it taut"
+            what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}"
+            remedy = "a closed chain or belt bears both ways; a rope goes slack where it would push"
             yield Finding.note("gears.slack", f"gears.{name}", what, remedy, lower=low, upper=high)
 
 
@@ -399,9 +391,8 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
     means = cycle.at.means
     if means.efficiency > 1 + ROUNDED + means.efficiency_error:
         drive = means.drive_power.net * cycle.run.cycle.duration
-        what = f"the efficiency of the cycle is {means.efficiency:.4g}, above 1: the drive supplies "
-        what += f"{readable(drive, 'J')}, and loads that are not useful, springs or masses supply work beside it"
-        remedy = "work beside the drive is not counted as input; leave out a load that stands for the drive itself"
+        what = f"the efficiency of the cycle is {means.efficiency:.4g}, above 1: the drive gives {readable(drive, 'J')}"
+        remedy = "work of loads, springs and masses is not counted as input; leave out a load that stands for the drive"
         figures = {"efficiency": means.efficiency, "drive": drive}
         yield Finding.warning("efficiency.above_one", "", what, remedy, **figures)
 
@@ -420,8 +411,7 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
     for end, low, high in loads.idle:
         idle.setdefault(cycle.between(low, high), {})[end.seat.joint] = None
     for text, joints in idle.items():
-        what = f"no load presses the pins of {', '.join(joints)} {text}: they float in their play, and positions there "
-        what += "are not valid"
+        what = f"no load presses the pins of {', '.join(joints)} {text}: positions there are not valid"
         remedy = "expect impact where the load sets in"
         yield Finding.note("contact.unloaded", "joints", what, remedy, joints=list(joints), at=text)
     lost: dict[tuple[str, str], list[Crossing]] = {}
@@ -441,15 +431,13 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
         ]  # fmt: skip
         if halts:
             text = listed([*dict.fromkeys(halts)])
-            what = f"the {part} lifts off the wall {text}: the inertia force of the motion within the play exceeds the "
-            what += "load"
+            what = f"the {part} lifts off the wall {text}: the inertia of its motion within the play exceeds the load"
             remedy = "forces there are those of a pin that stays in contact"
             yield Finding.warning("contact.lifted", where, what, remedy, part=part, at=text)
         late = unsettled & (at.arrays["contact_lost"][list(run.system.joints).index(joint)] > 0)
         if np.any(late):
             intervals, change = at.dial.intervals(np.flatnonzero(late)), np.max(at.arrays["seat_change"][late])
-            what = f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes by "
-            what += f"{change:.2g} times the clearance, for the load turns as the pin moves"
+            what = f"the seat did not converge {intervals}: it still changes by {change:.2g} times the clearance"
             remedy = "the pin floats there: treat it as loss of contact"
             yield Finding.warning("seat.unsettled", where, what, remedy, at=intervals, change=change)
     for (part, text), crossings in lost.items():
@@ -457,8 +445,7 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
         nearest = min(crossings, key=lambda cross: cross.least / cross.peak)
         least = nearest.least if nearest.least > NO_LOAD * nearest.peak else 0.0  # less than that is rounding
         what = f"the {part}{agreeing(len(names), ' loses', 's lose')} contact {text}: the load falls to "
-        what += f"{readable(least, 'N')} (peak {readable(nearest.peak, 'N')}) and reverses, and the pin would cross "
-        what += "its play"
+        what += f"{readable(least, 'N')} (peak {readable(nearest.peak, 'N')}) and reverses"
         facts: dict[str, Any] = {
             "part": part,
             "count": len(names),

@@ -22,7 +22,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from trunnion.algebra import panels as reading
-from trunnion.algebra.panels import ENDS, FIT, GAUSS_WEIGHTS, INTEGRAL, ON_GAUSS, ON_GRID, ON_POINTS, ORDER, POINTS
+from trunnion.algebra.panels import ENDS, FIT, GAUSS_WEIGHTS, ON_GAUSS, ON_GRID, ON_POINTS, ORDER, POINTS
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -182,23 +182,12 @@ class Courses:
             states=cut.states[begin:end],
         )
 
-    def panels_of(self, time: Array) -> Labels:
-        """Numbers of the panels at times, s; at an edge, or next to it, of the one after it."""
-        panels = np.searchsorted(self.edges, time + BESIDE * self.span, side="right") - 1
-        return np.asarray(np.clip(panels, 0, len(self.half) - 1))
-
-    def from_breaks(self, times: Array) -> Array:
-        """How far times, s, are from the nearest break."""
-        after = np.clip(np.searchsorted(self.breaks, times), 1, len(self.breaks) - 1)
-        return np.minimum(np.abs(times - self.breaks[after - 1]), np.abs(self.breaks[after] - times))
-
     # ---- means ------------------------------------------------------------------------------------------------
 
     def mean(self, of: Callable[[Array], Array] | None = None) -> Array:
         """Means over time of every row, or of what is made of the rows, (row, …) to (…) or (number, …)."""
-        if of is None:
-            return self._averaged(self.coefficients @ INTEGRAL)
-        numbers = of(np.moveaxis(self.coefficients @ ON_GAUSS, 1, 0))  # (…, panel, node)
+        rows = np.moveaxis(self.coefficients @ ON_GAUSS, 1, 0)
+        numbers = rows if of is None else of(rows)  # (…, panel, node)
         return self._averaged(np.moveaxis(numbers @ GAUSS_WEIGHTS, -1, 0))
 
     def error(self) -> Array:

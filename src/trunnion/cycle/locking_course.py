@@ -303,7 +303,7 @@ class LockingCourse:
             status: NDArray[np.integer] = status_of(back, time.shape)
             locked = ahead.locked
             if seated is not None:  # where it locks pins are in their seats
-                status = seated.status[seated.courses.panels_of(time)]
+                status = seated.status[seated.courses.panel(time + BESIDE * seated.courses.span)]
                 locked = status == Status.LOCKED
             answered = ((status < Status.NOT_CONVERGED) | (status == Status.LOCKED)) & np.isfinite(other.acting)
             forward = np.where(ahead.locked | locked, np.nan, [ahead.delivered, ahead.acting])
@@ -319,7 +319,8 @@ class LockingCourse:
         levels = (-least, least, 0.0, least)
         times = np.concatenate([courses.passages(row, level) for row, level in enumerate(levels)])
         # a power that is 0 at a break passes there
-        cut = courses.parted(times[courses.from_breaks(times) > SHORT * courses.span])
+        away = np.min(np.abs(times[:, None] - courses.breaks), axis=1)
+        cut = courses.parted(times[away > SHORT * courses.span])
         delivered, acting, back_delivered, back_acting, *_ = cut.at(cut.edges[:-1] + cut.half)
         driven, pushing = back_acting > least, acting > least
         cases = [
@@ -348,7 +349,8 @@ class LockingCourse:
 
     def states_at(self, time: Array) -> NDArray[np.int8]:
         """The code of the state at times, s; where it changes that of what follows."""
-        return self.course.status[self.course.courses.panels_of(time)].astype(np.int8)
+        courses = self.course.courses
+        return self.course.status[courses.panel(time + BESIDE * courses.span)].astype(np.int8)
 
     def reverse_figure(self) -> Figure | None:
         """Power that reaches the drivers over that of the useful loads and springs; None if these do not drive.

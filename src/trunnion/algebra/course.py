@@ -55,12 +55,16 @@ class Accuracy(NamedTuple):
 
 
 class Place(NamedTuple):
-    """An extreme: its value, its time, s, and whether it is beside a break; everywhere: of a constant, NaN s."""
+    """An extreme: its value, its time, s, and whether it is beside a break, before it, side −1, or after it, 1.
+
+    everywhere: of a constant, NaN s.
+    """
 
     value: float
     time: float
     at_break: bool = False
     everywhere: bool = False
+    side: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -233,7 +237,8 @@ class Courses:
         time = float(self.edges[panel] + self.half[panel] * (spot + 1.0))
         nearest = float(self.breaks[np.argmin(np.abs(self.breaks - time))])
         at_break = abs(nearest - time) <= BESIDE * self.span
-        return Place(value, nearest if at_break else time, at_break)
+        side = float(np.sign(self.edges[panel] + self.half[panel] - nearest))
+        return Place(value, nearest, True, side=side) if at_break else Place(value, time)
 
     def passages(self, row: int, level: float = 0.0) -> Array:
         """Times, s, rising, at which a row passes a level; where it jumps over it that of the jump."""

@@ -39,7 +39,6 @@ POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
 FORCES = ("drive_effort", "reaction_force", "reaction_moment", "end_load", "gear_torque", "drive_effort_change")
 FOLLOWED = ("drive_effort", *POWERS, "reaction_force")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
-SIDE = 1e-7  # of the cycle: beside a break
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther, and said to be there
 CLOSE = 1e-10  # of the cycle: breaks that are one
 SUPPOSED = "supposed_power"  # W: by how much that through the drivers differs from what stands in for it
@@ -244,16 +243,6 @@ class CycleCourse:
         if cycle.periodic and cycle.duration - time <= CLOSE * cycle.duration:
             time = 0.0
         return f"at {self.run.system.dial(self.run.values, np.array([time, cycle.duration])).at(0)}"
-
-    def side(self, place: Place, name: str, sign: float) -> float:
-        """Time, s, of an extreme of a variable of one row; at a break beside it, where the variable has that value."""
-        if place.everywhere:
-            return 0.0
-        if not place.at_break:
-            return place.time
-        both_sides = np.clip(place.time + SIDE * self.courses.span * np.array([-1.0, 1.0]), 0.0, self.courses.edges[-1])
-        values = sign * self.courses.at(both_sides)[self._places[name].start]
-        return float(both_sides[np.argmax(np.where(np.isfinite(values), values, -np.inf))])
 
     @cached_property
     def means(self) -> Means:

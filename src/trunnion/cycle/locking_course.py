@@ -51,6 +51,7 @@ UNLOCKED = 1e-9  # of the multiple at which it locks: with less by that it does 
 SHORT = 3e-5  # of the cycle, as 0.01° of a turn: a range that is less is none, and an end as near to a break is at it
 BITS = 48  # joints that are told apart by the state of their critical multiples
 MOST_PLACES = 3  # named in one figure
+SIDE = 1e-7  # of the cycle: beside a break
 BESIDE = 1e-8  # of the cycle: a position that is next to an end is behind it
 CLOSE = 1e-3  # degrees of the drive to which an end is told: two decimals are shown
 SHARE = 1e-5  # of the drive's travel, where that is not in degrees
@@ -486,7 +487,8 @@ class LockingCourse:
         least = least_margin(margins)
         if least is None:
             return None
-        time = np.array([margins.side(least, "locking_margin", -1.0)])
+        beside = least.side * SIDE * margins.courses.span  # of a break that the margin has this value at
+        time = np.array([0.0 if least.everywhere else least.time + beside])
         with np.errstate(all="ignore"):
             multiples = multiples_at(self.run, time, self.method.margin_up_to)
         finite = [(float(multiple[0]), joint) for joint, multiple in multiples.items() if np.isfinite(multiple[0])]

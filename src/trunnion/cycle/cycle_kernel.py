@@ -166,19 +166,19 @@ class Many:
         shape: tuple[int, int],
         variables: Collection[str],
         method: FrictionMethod,
-        quick: FrictionMethod,
     ) -> tuple[Arrays, Arrays]:
         """Variables of `results` by name, (…, mechanism, position); the same of the mechanisms without errors.
 
         values: every number, (mechanism, 1) where they vary; ideal: without errors, if any has some; the first arrays
         then hold the differences too. time: (mechanism, position) or (position,), s; variables: the only ones that are
-        filled. method, quick: for the mechanisms and for those without errors.
+        filled.
         """
         if ideal is None:
             return self.arrays(values, time, shape, variables, method), {}
         variables, parts = {*variables, *COMPARED}, ["errors"]
-        arrays_filled = self.arrays(values, time, shape, variables, method, parts)
-        meant = self.arrays(ideal, time, shape, variables, quick, parts)
+        arrays_filled, meant = (
+            self.arrays(numbers, time, shape, variables, method, parts) for numbers in (values, ideal)
+        )
         fill_errors(arrays_filled, meant, self.run.system, slice(None))
         return arrays_filled, meant
 
@@ -211,8 +211,8 @@ class Many:
 
         def look(mechanism: NDArray[np.intp], time: NDArray[np.float64]) -> tuple[Any, Any]:
             shape = (1, time.size) if len(of.cycles) == 1 else time.shape
-            meant = None if without is None else without.picked(mechanism)
-            solved = self.filled(of.picked(mechanism), meant, of.lanes(time), shape, names, method, method)[0]
+            ideal_values = None if without is None else without.picked(mechanism)
+            solved = self.filled(of.picked(mechanism), ideal_values, of.lanes(time), shape, names, method)[0]
             arrays = {name: array.reshape(*array.shape[:-2], *time.shape) for name, array in solved.items()}
             again, rows = stacked(arrays, names, 2)
             shapes.update(again)

@@ -417,7 +417,7 @@ class Points:
         self.erring = self.erring or bool(errs.any())
         ours = _as_chosen(run, values, len(points))
         meant = ideal_values if errs.any() else None
-        arrays, ideal = self._many.filled(values, meant, time, shape, (), self.method, self.method)
+        arrays, ideal = self._many.filled(values, meant, time, shape, (), self.method)
         ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
         if self._followed:
             ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)

@@ -587,9 +587,9 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
     return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, unit, place=place)
 
 
-def centred(run: Run, after: str = "") -> str:
+def centred(run: Run) -> str:
     """What ranges and the way back are of: of the mechanism without play."""
-    return (", pins centred" + after) * bool(run.seats)
+    return ", pins centred" * bool(run.seats)
 
 
 def _merged(edges: Array, codes: NDArray[np.integer], shortest: float) -> list[tuple[int, float, float]]:

@@ -40,7 +40,7 @@ def test_harmonics_are_followed(parts, phase):
 def test_a_stated_jump_has_both_sides_and_the_instant_between_is_no_value():
     found = course(lambda t: np.where(t == 1.0, 50.0, np.where(t < 1.0, t, -1.0)), breaks=(0.0, 1.0, 2.0))
     assert found.asked == 12 * (3 + 3)
-    assert top(found) == (pytest.approx(1.0), pytest.approx(1.0), True, False)
+    assert top(found) == (pytest.approx(1.0), pytest.approx(1.0), True, False, -1.0)
     before, after = (side[np.argmax(found.edges[1:-1] >= 1.0)] for side in found.sides(0))
     assert (before, after) == (pytest.approx(1.0), pytest.approx(-1.0))
     assert found.passages(0).tolist() == [pytest.approx(0.0, abs=1e-12), pytest.approx(1.0)]

@@ -55,9 +55,9 @@ class Accuracy(NamedTuple):
 
 
 class Place(NamedTuple):
-    """An extreme: its value, its time, s, and whether it is beside a break, before it, side −1, or after it, 1.
+    """An extreme: its value, its time, s, and whether it is beside a break.
 
-    everywhere: of a constant, NaN s.
+    everywhere: of a constant, NaN s; side: of an inner break, −1 before it, 1 after it.
     """
 
     value: float
@@ -237,7 +237,8 @@ class Courses:
         time = float(self.edges[panel] + self.half[panel] * (spot + 1.0))
         nearest = float(self.breaks[np.argmin(np.abs(self.breaks - time))])
         at_break = abs(nearest - time) <= BESIDE * self.span
-        side = float(np.sign(self.edges[panel] + self.half[panel] - nearest))
+        inner = self.edges[0] < nearest < self.edges[-1]
+        side = float(inner * np.sign(self.edges[panel] + self.half[panel] - nearest))
         return Place(value, nearest, True, side=side) if at_break else Place(value, time)
 
     def passages(self, row: int, level: float = 0.0) -> Array:

@@ -204,7 +204,7 @@ def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     if not means.has_useful_work:
         note = f"{NOTHING_USEFUL}: {STATE_USEFUL}"
     elif np.isfinite(value):
-        note = "the useful loads do no net work, or supply work" * bool(value <= 0)
+        note = "the useful loads do no net work" if value == 0 else "the useful loads supply work" * bool(value < 0)
     elif means.supposed > MOST_SUPPOSED:
         note = f"pins do not settle, which may change {means.supposed:.0%} of the work"
     elif not np.isfinite(means.drive_power.value):

@@ -328,10 +328,12 @@ def _of_key(mechanism: Varying, name: str) -> Iterator[tuple[str, Location]]:
     sections = {key: getattr(mechanism, key) for key in type(mechanism).model_fields}
     sections["joints"] = mechanism.stated_joints
     rows = [row.joint for row in mechanism.loop]
-    for location in (keys, *((section, *keys) for section in sections)):
+    groups = [section for section, entries in sections.items() if isinstance(entries, Mapping)]
+    for location in (keys, *((section, *keys) for section in groups)):
         section, owner = location[0], location[1] if location[1:] else ""
         entries = sections.get(section)
-        if not isinstance(entries.get(owner) if isinstance(entries, Mapping) else entries, str | BaseModel):
+        entry = entries.get(owner) if isinstance(entries, Mapping) else entries
+        if not isinstance(entry, str | BaseModel if location is keys else BaseModel):
             continue
         place: Location = location
         if section == "joints" and owner in rows:

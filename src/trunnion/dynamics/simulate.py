@@ -95,14 +95,9 @@ def simulate(
 
 @np.errstate(all="ignore")
 def simulated(
-    mechanism: Mechanism,
-    duration: float | None = None,
-    steps: int = 1000,
-    tolerance: float = 1e-9,
-    progress: Callable[[float], None] | None = None,
-    steady: bool = False,
-    evaluations: int = MOST_EVALUATIONS,
-) -> Result:
+    mechanism: Mechanism, duration: float | None, steps: int, tolerance: float,
+    progress: Callable[[float], None] | None, steady: bool, evaluations: int,
+) -> Result:  # fmt: skip
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
     run, playing = prepare(mechanism, free=True), in_play(mechanism)

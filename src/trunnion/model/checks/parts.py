@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, counted
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.expression import MOTION, RESERVED
+from trunnion.model.expression import MOTION, PLACED, RESERVED
 from trunnion.model.fields import drive_kind
 from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import Numbers
@@ -201,7 +201,12 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, names
     """A name in an expression that means nothing there."""
     refers = "" if str(source).strip() == name else f"refers to '{name}', which "
     moves = motion_dimensions(mechanism, names) if path.startswith("loads.") else {}
-    return Finding(f"'{source}' {refers}is not one of the dimensions", path, nearest(name, [*names, *moves]))
+    remedy = nearest(name, [*names, *moves])
+    if not moves and (PLACED in name or name in MOTION or name in mechanism.tables):
+        remedy = "motions of joints and points, drive, speed, time and tables are for loads"
+    elif moves and name in MOTION:
+        remedy = "the model has no driver"
+    return Finding(f"'{source}' {refers}is not one of the dimensions", path, remedy)
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------

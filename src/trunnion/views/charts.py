@@ -173,14 +173,13 @@ class Axis:
     """An axis of a chart.
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
-    with names; angles: marked at parts of a turn; count: of its marks.
+    with names; count: of its marks.
     """
 
     title: str = ""
     limits: tuple[float | None, float | None] = (None, None)
     places: Sequence[tuple[float, str]] | None = None
     log: bool = False
-    angles: bool = False
     count: int = 0
     margin: float | None = None
 

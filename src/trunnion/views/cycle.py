@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 SEEN = 0.002  # of the largest effort: narrower ranges would not be seen
 STEADY = 1e-6  # of the largest speed: variations that are none
-MOST_POINTS = 5000  # of the track of a vector
 PLANES = ((0, 1), (0, 2), (1, 2))
 TURN = 2 * np.pi
 RATES = {"": "", "_velocity": "/s", "_acceleration": "/s²"}
@@ -162,8 +161,7 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         at = [int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) for angle in np.arange(0.0, 360.0, 30.0)]
 
     def track(vector: Array, factor: float, look: Look) -> Line:
-        points = vector[:, :: -(-vector.shape[1] // MOST_POINTS)]
-        points = np.hstack([points, vector[:, :1]]) if over.closed else points
+        points = np.hstack([vector, vector[:, :1]]) if over.closed else vector
         points = np.hstack([np.zeros((2, 1)), points]) if points.shape[1] == 1 else points  # one position has no track
         return Line(points[0] * factor, points[1] * factor, None, look)
 
@@ -369,8 +367,8 @@ def _seat_courses(result: xr.Dataset) -> list[Chart]:
                 named = any(mark.look == crosses for mark in marks if isinstance(mark, Line))
                 marks.append(Line(over.values[places], values[places], None if named else "contact lost", crosses))
         if marks:
-            axis = Axis(title, angles=kind != "guide", margin=0.12)
-            charts.append(Chart(over, axis, [*silent(result, over), *marks], zero=True, legend=Legend(1)))
+            marks = [*silent(result, over), *marks]
+            charts.append(Chart(over, Axis(title, margin=0.12), marks, zero=True, legend=Legend(1)))
     return charts
 
 

@@ -229,8 +229,6 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
     if axis.places is not None:
         side.set_ticks([at for at, _ in axis.places], [plain(text) for _, text in axis.places])
         side.set_minor_locator(ticker.NullLocator())
-    elif axis.angles:
-        side.set_major_locator(ticker.MaxNLocator(nbins=8, steps=[1, 1.5, 3, 4.5, 9, 10]))
     elif axis.count:
         side.set_major_locator(ticker.MaxNLocator(nbins=axis.count))
         axes.ticklabel_format(axis=name, useOffset=False)  # type: ignore[arg-type]  # "x" or "y"

@@ -60,10 +60,8 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
     if kind_of(result) != "motion":
         drawn = scene(result, ideal)
         ((count, noun),) = counts((result.sizes["position"], "position"))
-        if drawn["thinned"] is not None:  # "3rd" if every third position is shown
-            stride = -(-drawn["thinned"] // drawn["count"])
-            ending = "th" if 10 <= stride % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(stride % 10, "th")
-            noun += f", every {stride}{ending} shown"
+        if drawn["thinned"] is not None:
+            noun += f", one in {-(-drawn['thinned'] // drawn['count'])} shown"
         return _page(result, drawn, [(count, noun)], compared=ideal is not None)
     if ideal is not None:
         raise TypeError("report() of a motion has no argument 'ideal'")

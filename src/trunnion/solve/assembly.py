@@ -119,7 +119,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             walk.assembly.append(assembly)
             counts.append(count)
             if isinstance(assembly, Track) and count == 0:
-                findings.append(_never(system, module))
+                findings.append(_never(module))
             assembled = module.rank > 1 and (group.BRANCHES or (isinstance(assembly, Track) and count > 0))
             if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
@@ -360,17 +360,12 @@ def _plain(walk: Forward, module: Module) -> set[int]:
     return plain
 
 
-def _never(system: System, module: Module) -> Finding:
+def _never(module: Module) -> Finding:
     """Of a module that has no assembly."""
-    links, plan, drivers = list(module.links), system.plan, len(system.mechanism.drivers)
+    links = list(module.links)
     what = f"links {', '.join(links)} cannot be assembled at any position of the cycle"
-    remedy, figures = "check the lengths, or give a better assembly hint", dict[str, Any](links=links)
-    if module.redundant and system.mechanism.has_errors:
-        what += " with their errors, as rigid parts"
-        remedy = "they need play to fit together: see `trunnion assemble FILE` for how much"
-    elif module.redundant:
-        spinning = f" ({len(plan.passive)} of them passive)" if plan.passive else ""
-        what += f"; the mobility is {plan.mobility} by Grübler's formula{spinning} and the number of drivers {drivers}"
-        remedy += "; so many constraints are consistent with special dimensions only: remove a driver or free a joint"
-        figures |= {"formula": plan.mobility, "drivers": drivers}
-    return Finding.warning("assembly.never", "links", what, remedy, **figures)
+    remedy = "check the lengths, or give a better assembly hint"
+    if module.redundant:
+        what += "; with more constraints than freedoms they fit together with special dimensions or with play only"
+        remedy += "; see `trunnion assemble FILE` for how much play they need, or remove a driver or free a joint"
+    return Finding.warning("assembly.never", "links", what, remedy, links=links)

@@ -18,7 +18,6 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
-from trunnion.results.quantities import drawn_in, signed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics import intervals
 from trunnion.statistics.costs import Cost
@@ -28,7 +27,6 @@ from trunnion.studies.allocation.problem import (
     Contribution,
     Criterion,
     SampledYield,
-    none,
 )
 from trunnion.studies.allocation.result import CLOSE, DEFAULT_YIELD, Allocated, dataset, share_of
 from trunnion.studies.allocation.rows import Rows, joined, rows_of
@@ -309,8 +307,7 @@ class _Rounds:
         for count in range(ROUNDS):
             everything = joined([rows, everything.picked(everything.moving)]) if count else rows
             problem = AllocationProblem(tuple(contributions), everything.effects)
-            outside = _nominal_outside(now)
-            answer = none(problem, outside) if outside else self.solved(problem)
+            answer = self.solved(problem)
             if not answer.found:
                 return Settled(answer, now, everything)
             after, bought = self.studied(answer.tolerances)
@@ -351,19 +348,3 @@ def _same(answer: Answer, rows: Rows, ahead: Rows) -> bool:
     )
     still = ~rows.moving
     return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
-
-
-def _nominal_outside(now: ToleranceStudy) -> list[Finding]:
-    """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
-    findings = []
-    for order in now.orders:
-        (lower, upper), measure, nominal = order.limits, order.measure, order.nominal
-        if lower > 0 or upper < 0:
-            word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
-            scale = drawn_in(bound, measure.figure_unit(now.run.system, now.run.values))
-            texts, limit = (signed(value, *scale, "", 6) for value in (nominal, bound))
-            what = f"the nominal value is {texts}, {word} is {limit}: tolerances cannot correct that"
-            where, remedy = f"measures.{measure.name}", "change the mechanism or the bound"
-            figures = {"nominal": nominal, "bound": bound}
-            findings.append(Finding.error("allocation.nominal_outside", where, what, remedy, **figures))
-    return findings

@@ -62,8 +62,7 @@ class RowEffects:
 
     lower, upper: limits of the deviation from the nominal, infinite where there is none; offset: deviation of the
     middle of the tolerances. linear, spread, drift: see above; the spread is signed, which matters with a correlation,
-    (contribution, contribution). labels, places, units: of the rows for messages: names, where in the cycle
-    (" at 60°"), and SI units.
+    (contribution, contribution). labels, units: of the rows for messages: names, SI units.
     """
 
     linear: Array
@@ -74,7 +73,6 @@ class RowEffects:
     offset: Array
     correlation: Array | None = None
     labels: tuple[str, ...] = ()
-    places: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
 
 
@@ -220,7 +218,7 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
     least: the half widths, m or rad, that are the least to be had.
     """
     used, effects, findings = problem.used(least), problem.effects, []
-    labels, places = (np.array(texts or [""] * len(used)) for texts in (effects.labels, effects.places))
+    labels = np.array(effects.labels or [""] * len(used))
     broken, (middle, half) = used > 1 + ALLOWED, problem.extent(least)
     low, high = middle - half, middle + half
 
@@ -234,7 +232,7 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
         over, limit = (high[row], effects.upper[row]) if upwards else (low[row], effects.lower[row])
         largest = problem.contributions[int(np.argmax((effects.linear + np.abs(effects.spread))[row] * least))]
         what = f"the limit {say(row, limit)} is infeasible: with all tolerances at their least the deviation "
-        what += f"is {say(row, over)}{places[row]}"
+        what += f"is {say(row, over)}"
         if problem.caps is not None:
             what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
         remedy, where = (

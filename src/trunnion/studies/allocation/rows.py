@@ -28,7 +28,7 @@ from trunnion.studies.tolerance.linear import MeasureOrder, Table, ToleranceStud
 Array = NDArray[np.float64]
 ANY = 1e-6  # half width, SI, at which the shape of a distribution is taken where there is none yet
 NUMBERS = ("linear", "spread", "drift", "lower", "upper", "offset")  # of effects, by row
-TEXTS = ("labels", "places", "units")
+TEXTS = ("labels", "units")
 
 
 @dataclass(frozen=True)
@@ -76,14 +76,12 @@ def rows_of(
     of_worst = criterion == "worst-case"
     parts: list[Rows] = []
 
-    def add(k: int, first: FirstOrder, time: Array, moves: bool) -> None:
+    def add(k: int, first: FirstOrder, moves: bool) -> None:
         effects = _effects(study, bought, criterion, k, first, ends[k])
-        count, dial = len(time), system.dial(values, np.nan_to_num(time))
-        placed = np.isfinite(time) & (study.run.cycle.duration > 0)
+        count = len(effects.offset)
         effects = replace(
             effects,
             labels=(f"measures.{orders[k].measure.name}",) * count,
-            places=tuple(f" at {dial.at(i)}" if placed[i] else "" for i in range(count)),
             units=(orders[k].measure.figure_unit(system, values),) * count,
         )
         finite = np.any(np.isfinite(ends[k])) & np.all(np.isfinite(effects.linear + effects.spread), axis=1)
@@ -92,18 +90,17 @@ def rows_of(
     for k, order in enumerate(orders):
         if not _everywhere(order):
             first = order.worst if of_worst and order.by_place else order.figure
-            add(k, first, np.array([order.time if order.placed else np.nan]), order.by_place)
+            add(k, first, order.by_place)
             continue
-        time, course, status = study.scanned(order.measure, of_worst)
-        good = sound(status)
-        add(k, FirstOrder(study.effects, course.slope[:, good]), time[good], order.measure.kind == "path_error")
+        _, course, status = study.scanned(order.measure, of_worst)
+        add(k, FirstOrder(study.effects, course.slope[:, sound(status)]), order.measure.kind == "path_error")
 
         def used(first: FirstOrder, k: int = k) -> Array:
             effects = _effects(study, bought, criterion, k, first, ends[k])
             return AllocationProblem((), effects).used(halves)
 
         worst = study.worst_place(order.measure, used, of_worst)
-        add(k, worst.worst if of_worst else worst.scatter, np.array([worst.time]), True)
+        add(k, worst.worst if of_worst else worst.scatter, True)
     rows = joined(parts)
     limited = [k for k in range(len(orders)) if np.any(np.isfinite(ends[k]))]
     unknown = tuple(orders[k].measure.name for k in limited if k not in rows.measure)

@@ -89,7 +89,7 @@ def by_replicates(values: Any, axis: int = -1) -> Interval:
 
 
 def share_by_replicates(passed: Any, size: int, axis: int = -1, least: float = 1 / 12) -> Interval:
-    """Interval of a chance from the counts `passed` of R independent replicates of `size` points each.
+    """Interval of a chance from the counts `passed` of R > 1 independent replicates of `size` points each.
 
     Wilson's score with the variance that the replicates show and Student's t for z, so that it stays in [0, 1]; where
     no count is near its ends it is `by_replicates` of the shares. Counts are whole, so their variance is taken as at
@@ -101,8 +101,6 @@ def share_by_replicates(passed: Any, size: int, axis: int = -1, least: float = 1
     number = passed.shape[axis]
     total = passed.sum(axis=axis)
     plain = share(total, number * size)
-    if number < 2:
-        return plain
     estimate = total / (number * size)
     variance = np.maximum(passed.var(axis=axis, ddof=1), least) / (number * size * size)
     spread = estimate * (1 - estimate)

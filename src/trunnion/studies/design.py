@@ -442,9 +442,6 @@ def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figu
     turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
     figures = [Figure("grashof", "four-bar type (Grashof)", answer.grashof)] if answer.grashof else []
-    if driver and not answer.transmission_angle and mechanism.fixed_link not in run.system.joints[driver].links:
-        why = f"{driver} drives two moving links; both are of a driver on {mechanism.fixed_link}"
-        figures.append(Figure("transmission_angle", "four-bar type and transmission angle", None, "°", note=why))
     for name, angle in answer.transmission_angle.items():
         subject = f"transmission angle of {name}"
         figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "minimum"))

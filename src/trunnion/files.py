@@ -168,10 +168,14 @@ def _destination(path: Path) -> Path | None:
         there = path.stat()
     except FileNotFoundError:
         return target
+    return target if stat.S_ISREG(there.st_mode) and not _is_output(path) else None
+
+
+def _is_output(path: Path) -> bool:
+    """Whether a file, or what it leads to, is where the output of the program goes."""
     with suppress(OSError):  # of a program without an output
-        if os.path.samestat(there, os.fstat(1)):
-            return None
-    return target if stat.S_ISREG(there.st_mode) else None
+        return os.path.samestat(path.stat(), os.fstat(1))
+    return False
 
 
 def _poured(temporary: Path, path: Path) -> None:
@@ -180,7 +184,8 @@ def _poured(temporary: Path, path: Path) -> None:
         what = "cannot be written: a folder of files does not go through a pipe"
         raise MechanismError(Finding(what, str(path), "name a file"))
     sys.stdout.flush()
-    with open(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as stream, temporary.open("rb") as made:
+    target = os.dup(1) if _is_output(path) else os.open(path, os.O_WRONLY)  # by one descriptor they go on in turn
+    with open(target, "wb") as stream, temporary.open("rb") as made:
         shutil.copyfileobj(made, stream)
 
 

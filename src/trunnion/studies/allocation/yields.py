@@ -24,6 +24,7 @@ from trunnion.studies.allocation.solve import cheapest
 Array = NDArray[np.float64]
 Verify = Callable[[Array, int], SampledYield]
 DIRECTIONS = 2048
+ROWS = 128  # rows that are multiplied by all directions at once
 FAR = 6.0  # standard deviations: a row with more room than that never fails
 LEAST, MOST = 0.05, 8.0  # standard deviations: margins that are looked at
 NEAR = 0.25  # standard deviations: how far normal deviations are usually off
@@ -192,12 +193,16 @@ def _within(sigma: Array, room: Array) -> float:
     """Share of normal numbers that rows keep within their room, by directions: sigma (row, part), room (side, row)."""
     dims = sigma.shape[1]
     directions = _directions(dims)
-    along = sigma @ directions
-    slopes, free = np.concatenate([along, -along]), room.reshape(-1, 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = free / slopes
-    last = np.min(np.where(slopes > 0, radius, np.inf), axis=0)
-    first = np.max(np.where(slopes < 0, radius, 0.0), axis=0, initial=0.0)
+    first, last = np.zeros(directions.shape[1]), np.full(directions.shape[1], np.inf)
+    for start in range(0, len(sigma), ROWS):
+        part = slice(start, start + ROWS)
+        along = sigma[part] @ directions
+        for slope, free in ((along, room[0, part, None]), (-along, room[1, part, None])):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                radius = free / slope
+            last = np.minimum(last, np.min(np.where(slope > 0, radius, np.inf), axis=0))
+            if np.any(free < 0):
+                first = np.maximum(first, np.max(np.where(slope < 0, radius, -np.inf), axis=0))
     inside = chdtr(dims, np.maximum(last, 0.0) ** 2) - chdtr(dims, first**2)
     return float(np.mean(np.where(last > first, inside, 0.0)))
 

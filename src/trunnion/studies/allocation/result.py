@@ -115,8 +115,13 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
     parameters = MemberUnits("parameter", units_along(toleranced["parameter_nominal"], "parameter"))
     saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(toleranced["nominal"], "measure")])
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
-    # the criterion says what is to be kept
-    findings_kept = [finding for finding in findings_of(toleranced) if not finding.code.startswith("limit.missed")]
+    # the criterion says what is to be kept, but of measures that have no rows
+    ignored = {f"measures.{name}" for name in allocated.rows.unknown}
+    findings_kept = [
+        finding
+        for finding in findings_of(toleranced)
+        if finding.where in ignored or not finding.code.startswith("limit.missed")
+    ]
     attributes: dict[str, Any] = {
         "kind": "allocation",
         "found": int(allocated.answer.found),

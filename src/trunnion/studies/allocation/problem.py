@@ -236,7 +236,7 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
         if problem.caps is not None:
             what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
         remedy, where = (
-            f"widen the limit, or narrow first '{largest.name}', the largest share",
+            f"widen the limit, change the nominal mechanism, or narrow first '{largest.name}', the largest share",
             label or f"row {row + 1}",
         )
         figures = {"limit": limit, "takes": over}

@@ -125,7 +125,7 @@ class Note(NamedTuple):
     across: Literal["left", "center", "right"] = "center"
     up: Literal["bottom", "center", "top"] = "center"
     data: bool = False
-    colour: str = "muted"
+    colour: str | int = "muted"
     size: float = 8.0
     shift: tuple[float, float] = (0.0, 0.0)
     boxed: bool = False

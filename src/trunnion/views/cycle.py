@@ -315,13 +315,13 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], result: xr.Dataset) ->
         paint, place = Look(k), offset[:, index]
         at, size = (float(place[0]), float(place[1])), float(np.hypot(*place))
         marks.append(Ring(at, PIN * rho, paint._replace(width=1.1, alpha=0.85, order=1.5), square, 0.07))
+        marks.append(Note(over.say(index), 1.0, 1.0 - 0.09 * k, "right", "top", colour=k, size=8.0))  # the key
         marks.append(Line(place[:1], place[1:], None, paint._replace(dash="none", mark="o", size=5.5, order=5.0)))
         if np.hypot(*force[:, index]) > WEAK * most:
             start = place * (1 + PIN * rho / size) if size > 1e-9 * rho else place
             tip = start + force[:, index] / most * ARROW * rho
             path = np.stack([start, tip], axis=1)
             marks.append(Line(path[0], path[1], None, paint._replace(width=1.5, order=6.0), arrow=True))
-            marks.append(Note(over.say(index), tip[0], tip[1], data=True, size=7.5, outwards=True))
     slack = seats.offsets[end, 2] * factor if seats.along > 0 else np.empty(0)
     if np.isfinite(slack).any():
         text = f"along the axis {number(float(np.nanmin(slack)), 3)} to {number(float(np.nanmax(slack)), 3)} {unit}"

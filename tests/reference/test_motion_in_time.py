@@ -86,6 +86,7 @@ def test_a_motor_too_weak_stalls():
 
     (figures,) = codes().values()
     wanted = {"time": 1.0, "coordinate": 1.0, "place": "rad", "given": 0.5, "needed": 0.6, "unit": "N m", "driver": "A"}
+    assert figures.pop("drivers") == ["A"]
     assert figures == {key: one if isinstance(one, str) else pytest.approx(one) for key, one in wanted.items()}
     assert list(codes()) == ["simulate.stalls"]
     assert list(codes(off_from=0.5)) == list(codes(brake=0.1, brake_from=0.5)) == ["simulate.rests"]

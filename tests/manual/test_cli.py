@@ -78,8 +78,9 @@ def test_check_lists_the_ways_and_draws_them(program, tmp_path):
     done = program("check", FOUR_BAR, "--assemblies", "ways.svg")
     assert done.code == 0
     shown = [line.strip() for line in done.out.splitlines()]
-    first = shown.index("way-1  C (7.607, 2.135) m  <- used")
-    assert shown[first + 1 : first + 3] == ["way-2  C (7.607, -2.135) m", "to use another: assembly: {coupler: way-2}"]
+    first = shown.index("way-1  C (7.60714, 2.1354) m  <- used")
+    assert shown[first + 1] == "way-2  C (7.60714, -2.1354) m"
+    assert shown[first + 2] == "to use another: assembly: {coupler: way-2}"
     assert "wrote ways.svg" in done.out
     assert b"<!-- coupler: way-2 -->" in (tmp_path / "ways.svg").read_bytes()
     assert files(tmp_path) == {"ways.svg"}
